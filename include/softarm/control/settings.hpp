@@ -1,0 +1,83 @@
+// What an experiment may choose about control: the law, its gains, its terms and the reference it follows.
+#pragma once
+
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "softarm/model/arm.hpp"
+
+namespace softarm {
+
+enum class ControlCoordinates {
+  u,     ///< the controller (17) in u: smooth everywhere
+  polar  ///< (17) in the paper's (phi, theta) with gains such as (23)
+};
+
+/// The terms of (17) that are evaluated; one that is left out costs nothing.
+struct ControlTerms {
+  bool inertia = true;    ///< B u''_ref
+  bool coriolis = true;   ///< C(u, u') u'_ref
+  bool gravity = true;    ///< G
+  bool stiffness = true;  ///< K u_ref
+  bool damping = true;    ///< D u'_ref
+};
+
+struct ControllerSettings {
+  ControlCoordinates coordinates = ControlCoordinates::u;
+  ControlTerms terms;
+  /// Diagonals of K_P (N m/rad) and K_D (N m s/rad), two numbers a segment: [u_x, u_y] or [phi, theta].
+  std::vector<double> kp;
+  std::vector<double> kd;
+  double valve_lag_s = 0.0;        ///< first-order lag inverted on the part of (17) that depends on the reference alone
+  double delay_s = 0.0;            ///< sensing and actuation dead time assumed by the load-time gain check
+  double max_theta_rad = 2.5;      ///< soft limit on the reference's and the arm's theta
+  double max_speed_radps = 20.0;   ///< soft limit on the reference's |u'| a segment
+  double max_step_rad = 0.2;       ///< a larger jump of a live reference is refused
+  double blend_s = 1.0;            ///< time in which a reference is joined from wherever the arm is
+  double polar_theta_min_rad = 0.05;  ///< bounds A^-1 and the phi error near theta = 0 in polar mode
+};
+
+/// Hold u constant.
+struct SetPointReference {
+  std::vector<double> u_rad;  ///< 2n
+};
+
+/// The paper's (24): theta rises to `theta_rad` in `rise_s`, phi_i = phi_centre + phi_amplitude cos(rate t + (i-1) phase).
+struct PaperReference {
+  double theta_rad = 0.4;
+  double rise_s = 1.0;
+  double phi_centre_rad = 3.141592653589793;
+  double phi_amplitude_rad = 1.0;
+  double rate_radps = 2.0;
+  double phase_step_rad = 1.0471975511965976;  ///< pi/3 from segment to segment
+};
+
+/// Smooth motion through way points: minimum-jerk (quintic) pieces, at rest in every point.
+struct WayPoint {
+  double time_s = 0.0;
+  std::vector<double> u_rad;  ///< 2n
+};
+struct WayPointReference {
+  std::vector<WayPoint> points;
+  bool repeat = false;
+};
+
+/// References received over LCM; until one arrives, the arm holds where it is.
+struct LiveReference {
+  double timeout_s = 0.2;  ///< silence after which the last received u is held at rest
+};
+
+using ReferenceKind = std::variant<SetPointReference, PaperReference, WayPointReference, LiveReference>;
+
+/// One phase of a sequence; the last one lasts for ever.
+struct ReferencePhase {
+  ReferenceKind kind;
+  double duration_s = 0.0;  ///< ignored for the last phase
+};
+
+struct ReferenceSettings {
+  std::vector<ReferencePhase> phases;
+};
+
+}  // namespace softarm

@@ -1,0 +1,48 @@
+// The constant description of a soft arm and the vector types every room shares.
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <vector>
+
+namespace softarm {
+
+/// Capacity of the fixed-size types used inside the control loop; the number of segments itself is chosen at run time.
+inline constexpr int kMaxSegments = 64;
+
+/// Two numbers a segment, [u1_x, u1_y, u2_x, u2_y, ...]. Run-time size, storage in place: copying it never allocates.
+using SegmentVector = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, 2 * kMaxSegments, 1>;
+using ConstVectorRef = const Eigen::Ref<const Eigen::VectorXd>&;
+using VectorRef = Eigen::Ref<Eigen::VectorXd>;
+
+/// One constant-curvature segment of the piecewise constant curvature (PCC) arm.
+struct SegmentParameters {
+  double length_m = 0.11;
+  double mass_kg = 0.15;
+  double stiffness_nm_per_rad = 0.626;  ///< k of (14)
+  double damping_nms_per_rad = 0.029;   ///< beta of (14)
+};
+
+/// Where a segment's mass sits. `point` is the paper's (all of it at the centre of mass, no rotational inertia);
+/// `distributed` spreads it homogeneously along the arc.
+enum class MassModel { point, distributed };
+
+/// Which input matrix A maps tau_A to generalized forces: `couple` is the paper's (15) with its transpose mended
+/// (singular at theta = pi), `chamber` the body-following moment of chambers and tendons (never singular).
+enum class ActuationModel { chamber, couple };
+
+/// An arm of n segments hanging from, or standing on, a base frame S_0. The straight arm points along +z of S_0.
+struct ArmParameters {
+  std::vector<SegmentParameters> segments;
+  MassModel mass = MassModel::distributed;
+  ActuationModel actuation = ActuationModel::chamber;
+  /// p_world = base_rotation * p_0 + base_position_m; the default hangs from a ceiling.
+  Eigen::Matrix3d base_rotation = Eigen::Vector3d(1.0, -1.0, -1.0).asDiagonal();
+  Eigen::Vector3d base_position_m = Eigen::Vector3d::Zero();
+  Eigen::Vector3d gravity_mps2 = Eigen::Vector3d(0.0, 0.0, -9.81);  ///< in the world frame
+
+  int size() const { return static_cast<int>(segments.size()); }
+  int dof() const { return 2 * size(); }
+};
+
+}  // namespace softarm

@@ -1,0 +1,1 @@
+#include "softarm/actuation/settings.hpp"

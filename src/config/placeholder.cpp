@@ -1,0 +1,1 @@
+#include "softarm/config/experiment.hpp"

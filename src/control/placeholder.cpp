@@ -1,0 +1,1 @@
+#include "softarm/control/settings.hpp"

@@ -1,0 +1,1 @@
+#include "softarm/daemon/settings.hpp"

@@ -1,0 +1,1 @@
+#include "softarm/estimation/settings.hpp"

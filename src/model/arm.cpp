@@ -1,0 +1,1 @@
+#include "softarm/model/arm.hpp"

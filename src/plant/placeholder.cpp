@@ -1,0 +1,1 @@
+#include "softarm/plant/settings.hpp"

@@ -1,0 +1,14 @@
+# find_package(softarm) works from another project: softarm::model, softarm::control, ...
+include(CMakePackageConfigHelpers)
+get_property(rooms GLOBAL PROPERTY SOFTARM_ROOMS)
+install(TARGETS ${rooms} EXPORT softarmTargets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
+install(DIRECTORY include/softarm DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
+install(DIRECTORY ${SOFTARM_GENERATED_DIR}/lcmtypes/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} FILES_MATCHING PATTERN "*.hpp")
+install(DIRECTORY config/ DESTINATION ${CMAKE_INSTALL_DATADIR}/softarm/config FILES_MATCHING PATTERN "*.yaml")
+install(DIRECTORY lcmtypes/ DESTINATION ${CMAKE_INSTALL_DATADIR}/softarm/lcmtypes FILES_MATCHING PATTERN "*.lcm")
+install(EXPORT softarmTargets NAMESPACE softarm:: DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/softarm)
+configure_package_config_file(${CMAKE_CURRENT_LIST_DIR}/softarmConfig.cmake.in ${PROJECT_BINARY_DIR}/softarmConfig.cmake
+  INSTALL_DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/softarm)
+write_basic_package_version_file(${PROJECT_BINARY_DIR}/softarmConfigVersion.cmake COMPATIBILITY SameMinorVersion)
+install(FILES ${PROJECT_BINARY_DIR}/softarmConfig.cmake ${PROJECT_BINARY_DIR}/softarmConfigVersion.cmake
+  ${PROJECT_SOURCE_DIR}/tools/cmake/SoftarmLcm.cmake DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/softarm)

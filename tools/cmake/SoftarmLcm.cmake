@@ -1,0 +1,12 @@
+# LCM with its CMake config (1.5) or without (Debian 12 ships 1.3.1 without one): lcm::lcm and LCM_GEN either way.
+find_package(lcm CONFIG QUIET)
+if(TARGET lcm)
+  add_library(lcm::lcm ALIAS lcm)
+endif()
+if(NOT TARGET lcm::lcm)
+  find_path(LCM_INCLUDE_DIR lcm/lcm.h REQUIRED)
+  find_library(LCM_LIBRARY lcm REQUIRED)
+  add_library(lcm::lcm UNKNOWN IMPORTED GLOBAL)
+  set_target_properties(lcm::lcm PROPERTIES IMPORTED_LOCATION "${LCM_LIBRARY}" INTERFACE_INCLUDE_DIRECTORIES "${LCM_INCLUDE_DIR}")
+endif()
+find_program(LCM_GEN lcm-gen REQUIRED)

@@ -1,0 +1,54 @@
+# softarm_room(NAME sources... [DEPENDS rooms/libraries] [PRIVATE_DEPENDS libraries]): one library a room of the house, so
+# that the linker enforces which way the arrows point. softarm_program(NAME sources... DEPENDS ...): one executable.
+# softarm_tests(LABEL ROOM DEPENDS ...): one test program from every *_test.cpp in the folder ROOM.
+
+add_library(softarm_options INTERFACE)
+target_compile_features(softarm_options INTERFACE cxx_std_20)
+target_compile_options(softarm_options INTERFACE -Wall -Wextra -Wconversion -Wshadow -Wno-psabi)
+if(SOFTARM_WARNINGS_AS_ERRORS)
+  target_compile_options(softarm_options INTERFACE -Werror)
+endif()
+if(SOFTARM_NATIVE)
+  add_compile_options(-march=native)
+endif()
+if(SOFTARM_SANITIZE)
+  add_compile_options(-fsanitize=${SOFTARM_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all)
+  add_link_options(-fsanitize=${SOFTARM_SANITIZE})
+endif()
+
+function(softarm_room name)
+  cmake_parse_arguments(ROOM "" "" "DEPENDS;PRIVATE_DEPENDS" ${ARGN})
+  add_library(softarm_${name} STATIC ${ROOM_UNPARSED_ARGUMENTS})
+  add_library(softarm::${name} ALIAS softarm_${name})
+  set_target_properties(softarm_${name} PROPERTIES EXPORT_NAME ${name})
+  target_include_directories(softarm_${name}
+    PUBLIC $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/include> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>
+    PRIVATE ${PROJECT_SOURCE_DIR}/src)
+  target_compile_features(softarm_${name} PUBLIC cxx_std_20)
+  target_link_libraries(softarm_${name} PUBLIC ${ROOM_DEPENDS} PRIVATE ${ROOM_PRIVATE_DEPENDS} $<BUILD_INTERFACE:softarm_options>)
+  set_property(GLOBAL APPEND PROPERTY SOFTARM_ROOMS softarm_${name})
+endfunction()
+
+function(softarm_program name)
+  cmake_parse_arguments(PROGRAM "" "" "DEPENDS" ${ARGN})
+  add_executable(${name} ${PROGRAM_UNPARSED_ARGUMENTS})
+  target_include_directories(${name} PRIVATE ${PROJECT_SOURCE_DIR}/src ${PROJECT_SOURCE_DIR}/tools)
+  target_link_libraries(${name} PRIVATE ${PROGRAM_DEPENDS} softarm_options)
+  install(TARGETS ${name} RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+endfunction()
+
+function(softarm_tests label room)
+  cmake_parse_arguments(TESTS "" "" "DEPENDS" ${ARGN})
+  file(GLOB sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/${room}/*_test.cpp)
+  if(NOT sources)
+    return()
+  endif()
+  set(target ${label}_${room}_tests)
+  add_executable(${target} ${sources})
+  target_include_directories(${target} PRIVATE ${PROJECT_SOURCE_DIR}/src ${PROJECT_SOURCE_DIR}/tools ${PROJECT_SOURCE_DIR}/tests)
+  target_link_libraries(${target} PRIVATE ${TESTS_DEPENDS} GTest::gtest_main softarm_options)
+  target_compile_definitions(${target} PRIVATE
+    SOFTARM_SOURCE_DIR="${PROJECT_SOURCE_DIR}" SOFTARM_BINARY_DIR="${PROJECT_BINARY_DIR}")
+  gtest_discover_tests(${target} TEST_PREFIX "${label}.${room}." PROPERTIES LABELS ${label} TIMEOUT 300
+    DISCOVERY_TIMEOUT 60)
+endfunction()
