@@ -4,11 +4,7 @@
 #include <cstdint>
 #include <string>
 
-#include "softarm/actuation/settings.hpp"
-#include "softarm/control/settings.hpp"
-#include "softarm/daemon/settings.hpp"
-#include "softarm/estimation/settings.hpp"
-#include "softarm/model/arm.hpp"
+#include "softarm/daemon/pipeline_settings.hpp"
 #include "softarm/plant/settings.hpp"
 
 namespace softarm {
@@ -18,18 +14,12 @@ struct RunSettings {
   double tracking_from_s = 1.0;   ///< after ACTIVE; tracking errors count from here on
 };
 
-struct Experiment {
+struct Experiment : PipelineSettings {
   std::string name;
   std::uint64_t seed = 1;
-  ArmParameters arm;              ///< what the controller believes
-  EstimationSettings estimation;
-  ControllerSettings control;
-  ReferenceSettings reference;
-  ActuationSettings actuation;
-  DaemonSettings daemon;
   PlantSettings plant;
   RunSettings run;
-  std::uint64_t hash = 0;         ///< FNV-1a of the resolved configuration's text
+  std::uint64_t hash = 0;  ///< FNV-1a of the resolved configuration's text
 };
 
 }  // namespace softarm

@@ -23,7 +23,8 @@ struct SafetySettings {
   double max_latency_s = 0.05;      ///< later frames count as stale
   int frozen_frames = 100;          ///< identical poses in a row while the command changes; 0: not checked
   int hold_overruns = 3;            ///< consecutive, judged only with SCHED_FIFO
-  int vent_overruns = 10;
+  int vent_overruns = 10;           ///< the same
+  bool valve_readback = false;      ///< valves publish measured pressures; 100 ms of silence is a fault
 };
 
 struct RealtimeSettings {
