@@ -10,8 +10,8 @@
 namespace softarm {
 
 struct RunSettings {
-  double duration_s = 20.0;       ///< default of `softarm run` and tools/demo
-  double tracking_from_s = 1.0;   ///< after ACTIVE; tracking errors count from here on
+  double duration_s = 20.0;      ///< default of `softarm run` and tools/demo
+  double tracking_from_s = 1.0;  ///< after ACTIVE; tracking errors count from here on
 };
 
 struct Experiment : PipelineSettings {

@@ -1,0 +1,39 @@
+// What is wrong with a configuration, and where: the only exception that reading one throws.
+#pragma once
+
+#include <stdexcept>
+#include <string>
+
+namespace softarm {
+
+/// Evidence of a faulty configuration. what() is "file:line: key: expected X, got Y".
+class ConfigError : public std::runtime_error {
+ public:
+  std::string file;  ///< as the user named it
+  int line = 0;      ///< 1-based; 0: the fault belongs to no line (the file cannot be read)
+  std::string
+      key;  ///< full dotted path, e.g. "arm.segments[1].length_m"; empty: the file as a whole
+  std::string expected;  ///< with unit and range
+  std::string got;
+
+  ConfigError(std::string file_name, int line_number, std::string key_path,
+              std::string expected_text, std::string got_text)
+      : std::runtime_error(message(file_name, line_number, key_path, expected_text, got_text)),
+        file(std::move(file_name)),
+        line(line_number),
+        key(std::move(key_path)),
+        expected(std::move(expected_text)),
+        got(std::move(got_text)) {}
+
+ private:
+  static std::string message(const std::string& file, int line, const std::string& key,
+                             const std::string& expected, const std::string& got) {
+    std::string text = file;
+    if (line > 0) text += ":" + std::to_string(line);
+    text += ": ";
+    if (!key.empty()) text += key + ": ";
+    return text + "expected " + expected + ", got " + got;
+  }
+};
+
+}  // namespace softarm

@@ -1,1 +1,0 @@
-#include "softarm/config/experiment.hpp"

@@ -1,0 +1,33 @@
+// What all executables share: exit codes, --help and --version, how an error is told.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <functional>
+#include <string>
+
+namespace softarm {
+
+/// Exit codes, after sysexits.h.
+enum ExitCode : int {
+  kExitOk = 0,
+  kExitFailure = 1,         ///< anything not listed here
+  kExitUsage = 64,          ///< the command line is wrong
+  kExitOtherInstance = 75,  ///< another instance holds the command channel
+  kExitConfiguration = 78,  ///< the configuration is wrong (ConfigError)
+};
+
+/// "0.1.0"
+const char* version_text() noexcept;
+/// The commit this was built from, "-dirty" where the tree differed from it.
+const char* commit_text() noexcept;
+
+/// Prints "NAME: error: MESSAGE" on stderr.
+void print_error(const std::string& program, const std::string& message);
+
+/// Adds --version, parses, then runs `body` and returns its exit code; errors become a message and
+/// the code above. The callback of a sub-command runs while parsing, before `body`; it may throw
+/// CLI::RuntimeError(code) to end the program with that code. Returns kExitFailure where standard
+/// output could not be written. Throws nothing.
+int run_program(int argc, char** argv, CLI::App& app, const std::function<int()>& body);
+
+}  // namespace softarm

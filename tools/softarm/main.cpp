@@ -1,0 +1,16 @@
+// softarm: the tools around the daemon, one sub-command each.
+#include <iostream>
+
+#include "program.hpp"
+#include "softarm/commands.hpp"
+
+int main(int argc, char** argv) {
+  CLI::App app("Tools for soft continuum arms under closed-loop control", "softarm");
+  app.require_subcommand(0, 1);
+  softarm::add_check_command(app);
+  return softarm::run_program(argc, argv, app, [&app]() -> int {
+    if (!app.get_subcommands().empty()) return softarm::kExitOk;
+    std::cerr << app.help();
+    return softarm::kExitUsage;
+  });
+}
