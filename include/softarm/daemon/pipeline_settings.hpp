@@ -1,4 +1,5 @@
-// Everything the control pipeline needs to know; an experiment adds the simulated arm and the run to it.
+// Everything the control pipeline needs to know; an experiment adds the simulated arm and the run
+// to it.
 #pragma once
 
 #include "softarm/actuation/settings.hpp"

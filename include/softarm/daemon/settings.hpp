@@ -1,4 +1,5 @@
-// What an experiment may choose about the daemon: its rate, its safety thresholds, its place on the machine.
+// What an experiment may choose about the daemon: its rate, its safety thresholds, its place on the
+// machine.
 #pragma once
 
 #include <cstdint>
@@ -15,28 +16,29 @@ enum class Arming {
 /// Thresholds of the safety monitor; zero for a time means "derive from control and frame period".
 struct SafetySettings {
   Arming arming = Arming::automatic;
-  double frame_period_s = 0.005;    ///< nominal, of the motion capture
-  double frame_latency_s = 0.0;     ///< declared, from capture to arrival
-  double hold_after_s = 0.0;        ///< 0: max(3 T, 3 frame periods + declared latency)
-  double vent_after_s = 0.0;        ///< 0: max(100 ms, 10 frame periods)
-  int good_frames = 50;             ///< in a row, before HOLD or VENT is left
-  double max_latency_s = 0.05;      ///< later frames count as stale
-  int frozen_frames = 100;          ///< identical poses in a row while the command changes; 0: not checked
-  int hold_overruns = 3;            ///< consecutive, judged only with SCHED_FIFO
-  int vent_overruns = 10;           ///< the same
-  bool valve_readback = false;      ///< valves publish measured pressures; 100 ms of silence is a fault
+  double frame_period_s = 0.005;  ///< nominal, of the motion capture
+  double frame_latency_s = 0.0;   ///< declared, from capture to arrival
+  double hold_after_s = 0.0;      ///< 0: max(3 T, 3 frame periods + declared latency)
+  double vent_after_s = 0.0;      ///< 0: max(100 ms, 10 frame periods)
+  int good_frames = 50;           ///< in a row, before HOLD or VENT is left
+  double max_latency_s = 0.05;    ///< later frames count as stale
+  int frozen_frames = 100;  ///< identical poses in a row while the command changes; 0: not checked
+  int hold_overruns = 3;    ///< consecutive, judged only with SCHED_FIFO
+  int vent_overruns = 10;   ///< the same
+  bool valve_readback = false;  ///< valves publish measured pressures; 100 ms of silence is a fault
 };
 
 struct RealtimeSettings {
-  bool fifo = false;       ///< SCHED_FIFO for the tick
+  bool fifo = false;  ///< SCHED_FIFO for the tick
   int priority = 50;
-  int cpu = -1;            ///< pin the tick's thread; -1: do not
+  int cpu = -1;  ///< pin the tick's thread; -1: do not
   bool lock_memory = false;
 };
 
 /// How a frame's capture time is brought to our monotonic clock.
 enum class CaptureTime {
-  sender,  ///< the sender's clock, its offset to ours estimated from the earliest arrivals, plus frame_latency_s
+  sender,  ///< the sender's clock, its offset to ours estimated from the earliest arrivals, plus
+           ///< frame_latency_s
   latency  ///< arrival minus frame_latency_s
 };
 
@@ -54,8 +56,8 @@ struct LcmSettings {
 
 /// Which bodies of the motion-capture frame carry the base and the segment ends.
 struct BodySettings {
-  int base_id = 0;                 ///< -1: the base is fixed by arm.base
-  std::vector<int> segment_ids;    ///< n ids, from the base to the tip
+  int base_id = 0;               ///< -1: the base is fixed by arm.base
+  std::vector<int> segment_ids;  ///< n ids, from the base to the tip
 };
 
 struct DaemonSettings {

@@ -1,0 +1,81 @@
+#include "softarm/daemon/realtime.hpp"
+
+#include <pthread.h>
+#include <sched.h>
+#include <sys/mman.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <time.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstddef>
+#include <cstring>
+#include <stdexcept>
+
+namespace softarm {
+namespace {
+
+constexpr std::int64_t kNsPerSecond = 1'000'000'000;
+
+}  // namespace
+
+std::int64_t monotonic_now_ns() noexcept {
+  timespec now{};
+  clock_gettime(CLOCK_MONOTONIC, &now);
+  return std::int64_t{now.tv_sec} * kNsPerSecond + now.tv_nsec;
+}
+
+void sleep_until_ns(std::int64_t deadline_ns) noexcept {
+  const timespec deadline{.tv_sec = deadline_ns / kNsPerSecond,
+                          .tv_nsec = deadline_ns % kNsPerSecond};
+  clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &deadline, nullptr);
+}
+
+std::vector<std::string> apply_realtime_settings(const RealtimeSettings& settings) {
+  std::vector<std::string> refused;
+  if (settings.cpu >= 0) {
+    cpu_set_t cpus;
+    CPU_ZERO(&cpus);
+    CPU_SET(static_cast<std::size_t>(settings.cpu), &cpus);
+    if (const int error = pthread_setaffinity_np(pthread_self(), sizeof cpus, &cpus); error != 0)
+      refused.push_back("cannot pin the tick to CPU " + std::to_string(settings.cpu) + ": " +
+                        std::strerror(error) +
+                        "; choose daemon.realtime.cpu among the CPUs of this machine");
+  }
+  if (settings.lock_memory && mlockall(MCL_CURRENT | MCL_FUTURE) != 0)
+    refused.push_back(
+        std::string("cannot lock memory: ") + std::strerror(errno) +
+        "; run as root or raise the limit (ulimit -l unlimited, LimitMEMLOCK=infinity)");
+  if (settings.fifo) {
+    const sched_param parameter{.sched_priority = settings.priority};
+    if (const int error = pthread_setschedparam(pthread_self(), SCHED_FIFO, &parameter); error != 0)
+      refused.push_back("cannot use SCHED_FIFO at priority " + std::to_string(settings.priority) +
+                        ": " + std::strerror(error) +
+                        "; run as root or raise the limit (ulimit -r, LimitRTPRIO=)");
+  }
+  return refused;
+}
+
+InstanceLock::InstanceLock(const std::string& name) {
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  // A leading zero byte makes the name abstract: it vanishes with the process, however it ends.
+  const std::string full = "softarm." + name;
+  const std::size_t length = std::min(full.size(), sizeof address.sun_path - 1);
+  std::memcpy(address.sun_path + 1, full.data(), length);
+  socket_ = socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+  const auto size = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + 1 + length);
+  if (socket_ < 0 || bind(socket_, reinterpret_cast<const sockaddr*>(&address), size) != 0) {
+    const int error = errno;
+    if (socket_ >= 0) close(socket_);
+    throw std::runtime_error(error == EADDRINUSE
+                                 ? "another instance already serves " + name + "; stop it first"
+                                 : "cannot lock " + name + ": " + std::strerror(error));
+  }
+}
+
+InstanceLock::~InstanceLock() { close(socket_); }
+
+}  // namespace softarm
