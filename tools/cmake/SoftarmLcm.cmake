@@ -1,12 +1,25 @@
-# LCM with its CMake config (1.5) or without (Debian 12 ships 1.3.1 without one): lcm::lcm and LCM_GEN either way.
+# The target lcm::lcm, from LCM's own CMake config (1.4 and later: target `lcm`) or without one (Debian 12 ships none, and
+# its lcm.pc asks for a glib.pc that liblcm-dev does not bring). Used by our build and by the installed package.
 find_package(lcm CONFIG QUIET)
-if(TARGET lcm)
-  add_library(lcm::lcm ALIAS lcm)
+if(NOT TARGET lcm::lcm)
+  if(TARGET lcm)
+    add_library(lcm::lcm ALIAS lcm)
+  else()
+    find_path(LCM_INCLUDE_DIR lcm/lcm.h)
+    find_library(LCM_LIBRARY lcm)
+    if(LCM_INCLUDE_DIR AND LCM_LIBRARY)
+      add_library(lcm::lcm UNKNOWN IMPORTED GLOBAL)
+      set_target_properties(lcm::lcm PROPERTIES
+        IMPORTED_LOCATION "${LCM_LIBRARY}" INTERFACE_INCLUDE_DIRECTORIES "${LCM_INCLUDE_DIR}")
+    endif()
+  endif()
 endif()
 if(NOT TARGET lcm::lcm)
-  find_path(LCM_INCLUDE_DIR lcm/lcm.h REQUIRED)
-  find_library(LCM_LIBRARY lcm REQUIRED)
-  add_library(lcm::lcm UNKNOWN IMPORTED GLOBAL)
-  set_target_properties(lcm::lcm PROPERTIES IMPORTED_LOCATION "${LCM_LIBRARY}" INTERFACE_INCLUDE_DIRECTORIES "${LCM_INCLUDE_DIR}")
+  set(message "LCM was not found: neither lcmConfig.cmake nor lcm/lcm.h and liblcm (Debian: liblcm-dev, liblcm-bin)")
+  if(CMAKE_FIND_PACKAGE_NAME)  # inside find_package(softarm): the caller decides whether that is fatal
+    set(${CMAKE_FIND_PACKAGE_NAME}_FOUND FALSE)
+    set(${CMAKE_FIND_PACKAGE_NAME}_NOT_FOUND_MESSAGE "${message}")
+    return()
+  endif()
+  message(FATAL_ERROR "${message}")
 endif()
-find_program(LCM_GEN lcm-gen REQUIRED)
