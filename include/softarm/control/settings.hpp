@@ -1,4 +1,5 @@
-// What an experiment may choose about control: the law, its gains, its terms and the reference it follows.
+// What an experiment may choose about control: the law, its gains, its terms and the reference it
+// follows.
 #pragma once
 
 #include <string>
@@ -26,16 +27,19 @@ struct ControlTerms {
 struct ControllerSettings {
   ControlCoordinates coordinates = ControlCoordinates::u;
   ControlTerms terms;
-  /// Diagonals of K_P (N m/rad) and K_D (N m s/rad), two numbers a segment: [u_x, u_y] or [phi, theta].
+  /// Diagonals of K_P (N m/rad) and K_D (N m s/rad), two numbers a segment: [u_x, u_y] or [phi,
+  /// theta].
   std::vector<double> kp;
   std::vector<double> kd;
-  double valve_lag_s = 0.0;        ///< first-order lag inverted on the part of (17) that depends on the reference alone
-  double delay_s = 0.0;            ///< sensing and actuation dead time assumed by the load-time gain check
-  double max_theta_rad = 2.5;      ///< soft limit on the reference's and the arm's theta
-  double max_speed_radps = 20.0;   ///< soft limit on the reference's |u'| a segment
-  double max_step_rad = 0.2;       ///< a larger jump of a live reference is refused
-  double blend_s = 1.0;            ///< time in which a reference is joined from wherever the arm is
-  double polar_theta_min_rad = 0.05;  ///< bounds A^-1 and the phi error near theta = 0 in polar mode
+  double valve_lag_s =
+      0.0;  ///< first-order lag inverted on the part of (17) that depends on the reference alone
+  double delay_s = 0.0;  ///< sensing and actuation dead time assumed by the load-time gain check
+  double max_theta_rad = 2.5;     ///< soft limit on the reference's and the arm's theta
+  double max_speed_radps = 20.0;  ///< soft limit on the reference's |u'| a segment
+  double max_step_rad = 0.2;      ///< a larger jump of a live reference is refused
+  double blend_s = 1.0;           ///< time in which a reference is joined from wherever the arm is
+  double polar_theta_min_rad =
+      0.05;  ///< bounds A^-1 and the phi error near theta = 0 in polar mode
 };
 
 /// Hold u constant.
@@ -43,7 +47,8 @@ struct SetPointReference {
   std::vector<double> u_rad;  ///< 2n
 };
 
-/// The paper's (24): theta rises to `theta_rad` in `rise_s`, phi_i = phi_centre + phi_amplitude cos(rate t + (i-1) phase).
+/// The paper's (24): theta rises to `theta_rad` in `rise_s`, phi_i = phi_centre + phi_amplitude
+/// cos(rate t + (i-1) phase).
 struct PaperReference {
   double theta_rad = 0.4;
   double rise_s = 1.0;
@@ -68,7 +73,8 @@ struct LiveReference {
   double timeout_s = 0.2;  ///< silence after which the last received u is held at rest
 };
 
-using ReferenceKind = std::variant<SetPointReference, PaperReference, WayPointReference, LiveReference>;
+using ReferenceKind =
+    std::variant<SetPointReference, PaperReference, WayPointReference, LiveReference>;
 
 /// One phase of a sequence; the last one lasts for ever.
 struct ReferencePhase {

@@ -1,0 +1,30 @@
+// Limits on how fast commanded pressures move.
+#pragma once
+
+#include "softarm/actuation/pressure_allocator.hpp"
+
+namespace softarm {
+
+/// `wanted`, or the value on the way to it that is at most `max_step` >= 0 away from `previous`. A
+/// `wanted` that is not finite, or a max_step that is not positive, leaves `previous`.
+double step_towards(double previous, double wanted, double max_step) noexcept;
+
+/// The last stage before the valves: pressure limits, slew limit, vent ramp. Holds no state.
+class PressureRamps {
+ public:
+  explicit PressureRamps(const ActuationSettings& settings);
+
+  /// Clamps `wanted_bar` into [min, max], then moves from `previous_bar` towards it by at most slew
+  /// rate times `dt_s`. `out` may be either argument.
+  void limit(const PressureVector& previous_bar, const PressureVector& wanted_bar, double dt_s,
+             PressureVector& out) const noexcept;
+
+  /// Moves every pressure towards 0 bar (not the minimum, not the bias) by at most vent rate times
+  /// `dt_s`.
+  void vent(const PressureVector& previous_bar, double dt_s, PressureVector& out) const noexcept;
+
+ private:
+  double min_bar_, max_bar_, slew_bar_per_s_, vent_bar_per_s_;
+};
+
+}  // namespace softarm

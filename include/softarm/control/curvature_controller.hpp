@@ -1,0 +1,59 @@
+// The curvature controller (17).
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "softarm/control/reference.hpp"
+#include "softarm/control/settings.hpp"
+#include "softarm/model/arm.hpp"
+#include "softarm/model/dynamics.hpp"
+
+namespace softarm {
+
+/// What the controller asks of the actuation: 2n numbers each.
+struct ControlOutput {
+  SegmentVector tau_u_nm;  ///< generalized force in u (N m)
+  SegmentVector
+      tau_actuation_nm;  ///< tau_A = A^-1 tau_u, (tau_x, tau_y) about the local axes (N m)
+  bool bounded = false;  ///< near a singularity (sin theta = 0 of A_couple, theta = 0 in polar)
+                         ///< something was bounded
+};
+
+/// (17) in u,
+///   tau = G(u) + C(u,u') u'_ref + B(u) u''_ref + K u_ref + K_P (u_ref - u) + D u'_ref + K_D
+///   (u'_ref - u'),
+/// or in the paper's polar coordinates, evaluated in u through the exact chain rule. On the model
+/// it was given it leaves (18), B e'' + C e' = -(K + K_P) e - (D + K_D) e', in the chosen
+/// coordinates.
+class CurvatureController {
+ public:
+  /// Throws std::invalid_argument (expected, got) where gains do not fit the arm.
+  CurvatureController(const ArmParameters& arm, const ControllerSettings& settings);
+
+  /// How far before and after now the reference is needed (s); 0 without a valve lag to invert.
+  double lookahead_s() const noexcept;
+
+  /// u, velocity: 2n, the estimated state (rad, rad/s). O(n), no allocation. With a valve lag and a
+  /// window whose interval_s > 0 it adds valve_lag d/dt FF(t) by a central difference, where FF =
+  /// G(u_r) + C(u_r,u_r') u_r' + B(u_r) u_r'' + K u_r + D u_r' is what (17) asks for on the
+  /// reference itself.
+  void compute(ConstVectorRef u, ConstVectorRef velocity, const ReferenceWindow& reference,
+               ControlOutput& out) noexcept;
+
+ private:
+  void feedback_u(ConstVectorRef u, ConstVectorRef velocity, const ReferenceSample& reference,
+                  ControlOutput& out) noexcept;
+  void feedback_polar(ConstVectorRef u, ConstVectorRef velocity, const ReferenceSample& reference,
+                      ControlOutput& out) noexcept;
+  void feed_forward(const ReferenceSample& reference, SegmentVector& out) noexcept;
+  void add_lag_inverse(const ReferenceWindow& reference, ControlOutput& out) noexcept;
+
+  ArmParameters arm_;
+  ControllerSettings settings_;
+  DynamicsWorkspace workspace_;
+  SegmentVector kp_, kd_, stiffness_, damping_;
+  SegmentVector velocity_ref_, acceleration_ref_, before_, after_;
+};
+
+}  // namespace softarm

@@ -1,0 +1,95 @@
+// What the arm is asked to do: u_ref(t) with its first two derivatives, joined smoothly from
+// wherever the arm is.
+//
+//   Reference reference(settings, control, n);
+//   reference.start(now_s, u, velocity);              // at ACTIVE, also after HOLD and VENT
+//   reference.window(now_s, controller.lookahead_s(), samples);
+//   controller.compute(u, velocity, samples, output);
+#pragma once
+
+#include <memory>
+
+#include "softarm/control/settings.hpp"
+#include "softarm/model/arm.hpp"
+
+namespace softarm {
+
+/// A reference at one time: 2n numbers each; rad, rad/s, rad/s^2.
+struct ReferenceSample {
+  SegmentVector u;
+  SegmentVector velocity;
+  SegmentVector acceleration;
+  /// The same in polar coordinates [phi, theta] a segment, where the reference knows them without
+  /// dividing by theta
+  /// ((24) outside of a blend); otherwise has_polar is false and they are unspecified.
+  bool has_polar = false;
+  SegmentVector polar;
+  SegmentVector polar_velocity;
+  SegmentVector polar_acceleration;
+  bool limited = false;  ///< a soft limit (theta or speed) bent this sample, or could not
+};
+
+/// A reference now and a little before and after, for the derivative that inverts the valve lag.
+struct ReferenceWindow {
+  ReferenceSample now;
+  ReferenceSample before;
+  ReferenceSample after;
+  double interval_s = 0.0;  ///< time from `before` to `after`; 0: only `now` is filled in
+};
+
+enum class LiveVerdict {
+  accepted,
+  not_live,    ///< the phase of this time does not listen
+  wrong_size,  ///< not 2n numbers
+  not_finite,
+  out_of_limits,  ///< beyond max_theta_rad or max_speed_radps
+  step_too_large  ///< further than max_step_rad from the reference so far
+};
+
+/// Largest theta that a reference reaches, live ones apart (0).
+double largest_theta_rad(const ReferenceSettings& settings) noexcept;
+
+/// The phases of an experiment. Times are seconds of any one clock of the caller's. No allocation
+/// after construction.
+///
+/// Joining: to the phase's own curve a quintic offset d(t) is added that starts with d = u - u_ref,
+/// d' = u' - u'_ref, d'' = 0 and is zero with its first two derivatives after blend_s, or later
+/// where max_speed_radps asks for it. An arm at rest on the reference thus follows it exactly.
+/// Phases of a sequence are joined in the same way.
+///
+/// Soft limits: curves that would exceed max_theta_rad or max_speed_radps are refused at load or on
+/// reception. What a blend adds beyond 98 % of max_theta_rad is bent inside it radially (C2,
+/// derivatives exact), and flagged; a blend that still exceeds max_speed_radps is only flagged.
+class Reference {
+ public:
+  /// Throws std::invalid_argument (phase, expected, got) for sizes, times or limits that do not
+  /// fit.
+  Reference(const ReferenceSettings& settings, const ControllerSettings& control, int segments);
+  ~Reference();
+  Reference(Reference&&) noexcept;
+  Reference& operator=(Reference&&) noexcept;
+
+  /// Starts the reference's time at `time_s` with the arm at u (2n, rad), velocity (2n, rad/s).
+  void start(double time_s, ConstVectorRef u, ConstVectorRef velocity) noexcept;
+  bool started() const noexcept;
+
+  /// The reference at any time; before the start it is what it is at the start. A function of time
+  /// alone between calls of start() and receive(). Unspecified before the first start().
+  void sample(double time_s, ReferenceSample& out) const noexcept;
+
+  /// `now`, and with lookahead_s > 0 also `before` and `after` by so much, not reaching back over
+  /// the start.
+  void window(double time_s, double lookahead_s, ReferenceWindow& out) const noexcept;
+
+  /// A live reference arrived: 2n numbers each; rad, rad/s, rad/s^2. Between messages it is
+  /// extrapolated with the received derivatives; after `timeout_s` it returns to the last received
+  /// u and rests there.
+  LiveVerdict receive(double time_s, ConstVectorRef u, ConstVectorRef velocity,
+                      ConstVectorRef acceleration) noexcept;
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace softarm
