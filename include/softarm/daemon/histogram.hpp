@@ -7,37 +7,39 @@
 
 namespace softarm {
 
+/// 2^(bucket/2) us, the lower edge of a bucket.
+inline double bucket_edge_us(int bucket) noexcept {
+  const auto octave = static_cast<double>(std::uint64_t{1} << (bucket / 2));
+  return bucket % 2 == 0 ? octave : octave * 1.4142135623730951;
+}
+
+inline constexpr int kDurationBuckets = 32;
+using DurationCounts = std::array<std::int32_t, kDurationBuckets>;
+
+/// Upper edge of the bucket below which `fraction` of the durations lie; 0 when there are none.
+inline double quantile_us(const DurationCounts& counts, double fraction) noexcept {
+  std::int64_t total = 0;
+  for (const auto count : counts) total += count;
+  std::int64_t below = 0;
+  for (int k = 0; k < kDurationBuckets; ++k) {
+    below += counts[static_cast<std::size_t>(k)];
+    if (total > 0 && static_cast<double>(below) >= fraction * static_cast<double>(total))
+      return bucket_edge_us(k + 1);
+  }
+  return 0.0;
+}
+
 /// Bucket k counts durations from 2^(k/2) us up to the next; bucket 0 also everything shorter, the
-/// last everything longer.
+/// last one everything longer.
 class DurationHistogram {
  public:
-  static constexpr int kBuckets = 32;
-
   void add_ns(std::int64_t duration_ns) noexcept {
     ++counts_[static_cast<std::size_t>(bucket(duration_ns))];
-    ++total_;
     if (duration_ns > max_ns_) max_ns_ = duration_ns;
   }
 
-  /// Upper edge, in us, of the bucket below which `fraction` of the durations lie; 0 when empty.
-  double quantile_us(double fraction) const noexcept {
-    const double wanted = fraction * static_cast<double>(total_);
-    std::int64_t below = 0;
-    for (int k = 0; k < kBuckets; ++k) {
-      below += counts_[static_cast<std::size_t>(k)];
-      if (static_cast<double>(below) >= wanted && total_ > 0) return lower_edge_us(k + 1);
-    }
-    return 0.0;
-  }
-
-  const std::array<std::int32_t, kBuckets>& counts() const noexcept { return counts_; }
-  std::int64_t max_ns() const noexcept { return max_ns_; }
-
-  /// 2^(bucket/2) us.
-  static double lower_edge_us(int bucket) noexcept {
-    const auto octave = static_cast<double>(std::uint64_t{1} << (bucket / 2));
-    return bucket % 2 == 0 ? octave : octave * 1.4142135623730951;
-  }
+  const DurationCounts& counts() const noexcept { return counts_; }
+  double max_us() const noexcept { return 1e-3 * static_cast<double>(max_ns_); }
 
  private:
   static int bucket(std::int64_t duration_ns) noexcept {
@@ -45,13 +47,12 @@ class DurationHistogram {
     const auto us = static_cast<std::uint64_t>(duration_ns) / 1000;
     const int octave = std::bit_width(us) - 1;
     const bool upper_half =
-        static_cast<double>(duration_ns) * 1e-3 >= lower_edge_us(2 * octave + 1);
+        static_cast<double>(duration_ns) * 1e-3 >= bucket_edge_us(2 * octave + 1);
     const int k = 2 * octave + (upper_half ? 1 : 0);
-    return k < kBuckets ? k : kBuckets - 1;
+    return k < kDurationBuckets ? k : kDurationBuckets - 1;
   }
 
-  std::array<std::int32_t, kBuckets> counts_{};
-  std::int64_t total_ = 0;
+  DurationCounts counts_{};
   std::int64_t max_ns_ = 0;
 };
 

@@ -1,0 +1,218 @@
+#include "softarm/daemon/safety_monitor.hpp"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+namespace softarm {
+namespace {
+
+constexpr std::int64_t kMs = 1'000'000;
+constexpr double kPeriod_s = 0.002;
+
+/// Steps time by hand: 500 Hz ticks, 200 Hz frames of 5 ms latency unless a test says otherwise.
+class Bench {
+ public:
+  explicit Bench(Arming arming = Arming::automatic, bool readback = false)
+      : monitor(
+            [&] {
+              SafetySettings settings;
+              settings.arming = arming;
+              settings.frame_latency_s = 0.005;
+              settings.valve_readback = readback;
+              return settings;
+            }(),
+            kPeriod_s) {}
+
+  Mode tick(std::int64_t step_ns = 2 * kMs) {
+    input.now_ns += step_ns;
+    input.good_frames = frames_per_tick;
+    if (frames_per_tick > 0) input.newest_capture_ns = input.now_ns - 5 * kMs;
+    input.newest_measurement_ns = input.now_ns;
+    const Mode mode = monitor.step(input);
+    input.arm = input.disarm = false;
+    input.bad_frames = 0;
+    input.sender_restarted = false;
+    return mode;
+  }
+  Mode run(int ticks) {
+    for (int k = 0; k < ticks; ++k) tick();
+    return monitor.mode();
+  }
+  void activate() {
+    input.fully_vented = true;
+    run(60);
+    ASSERT_EQ(monitor.mode(), Mode::active);
+    input.fully_vented = false;
+  }
+
+  SafetyMonitor monitor;
+  SafetyInput input{.now_ns = 1'000'000'000};
+  int frames_per_tick = 1;
+};
+
+TEST(SafetyMonitor, ThresholdsFollowTheirRule) {
+  SafetySettings settings;
+  settings.frame_period_s = 0.005;
+  settings.frame_latency_s = 0.005;
+  auto thresholds = resolve_thresholds(settings, 0.002);
+  EXPECT_EQ(thresholds.hold_after_ns, 20 * kMs);
+  EXPECT_EQ(thresholds.vent_after_ns, 100 * kMs);
+  settings.frame_period_s = 0.125;
+  thresholds = resolve_thresholds(settings, 0.02);
+  EXPECT_EQ(thresholds.hold_after_ns, 380 * kMs);
+  EXPECT_EQ(thresholds.vent_after_ns, 1250 * kMs);
+  settings.hold_after_s = 0.05;
+  EXPECT_EQ(resolve_thresholds(settings, 0.02).hold_after_ns, 50 * kMs);
+}
+
+TEST(SafetyMonitor, WaitsForFiftyGoodFramesInARow) {
+  Bench bench;
+  bench.input.fully_vented = true;
+  bench.run(49);
+  EXPECT_EQ(bench.monitor.mode(), Mode::wait_frames);
+  bench.input.bad_frames = 1;
+  bench.tick();
+  EXPECT_EQ(bench.run(49), Mode::wait_frames);
+  EXPECT_EQ(bench.run(1), Mode::active);
+}
+
+TEST(SafetyMonitor, ExplicitArmingWaitsForTheOperator) {
+  Bench bench(Arming::explicit_);
+  bench.input.fully_vented = true;
+  EXPECT_EQ(bench.run(200), Mode::wait_frames);
+  EXPECT_EQ(bench.monitor.reason(), Reason::waiting_for_arm);
+  bench.input.arm = true;
+  EXPECT_EQ(bench.tick(), Mode::active);
+}
+
+TEST(SafetyMonitor, SilenceHoldsThenVentsAndComesBack) {
+  Bench bench;
+  bench.activate();
+  bench.frames_per_tick = 0;  // the age is 5 ms at the last frame and grows by 2 ms a tick
+  EXPECT_EQ(bench.run(7), Mode::active);
+  EXPECT_EQ(bench.run(1), Mode::hold);
+  EXPECT_EQ(bench.monitor.reason(), Reason::frames_late);
+  EXPECT_EQ(bench.run(39), Mode::hold);
+  EXPECT_EQ(bench.run(1), Mode::vent);
+  EXPECT_EQ(bench.monitor.reason(), Reason::frames_stale);
+  bench.frames_per_tick = 1;
+  EXPECT_EQ(bench.run(200), Mode::vent) << "must not leave before it is fully vented";
+  bench.input.fully_vented = true;
+  EXPECT_EQ(bench.run(1), Mode::active);
+}
+
+TEST(SafetyMonitor, HoldEndsAfterFiftyGoodFrames) {
+  Bench bench;
+  bench.activate();
+  bench.frames_per_tick = 0;
+  ASSERT_EQ(bench.run(9), Mode::hold);
+  bench.frames_per_tick = 1;
+  EXPECT_EQ(bench.run(49), Mode::hold);
+  EXPECT_EQ(bench.run(1), Mode::active);
+}
+
+TEST(SafetyMonitor, VentTakesTheArmingBack) {
+  Bench bench(Arming::explicit_);
+  bench.input.fully_vented = true;
+  bench.run(60);
+  bench.input.arm = true;
+  ASSERT_EQ(bench.tick(), Mode::active);
+  bench.input.sender_restarted = true;
+  EXPECT_EQ(bench.tick(), Mode::vent);
+  EXPECT_EQ(bench.run(500), Mode::vent);
+  EXPECT_EQ(bench.monitor.reason(), Reason::waiting_for_arm);
+  bench.input.arm = true;
+  EXPECT_EQ(bench.tick(), Mode::active);
+}
+
+TEST(SafetyMonitor, EachCauseDemandsItsMode) {
+  struct Row {
+    void (*cause)(Bench&);
+    Mode mode;
+    Reason reason;
+  };
+  const Row rows[] = {
+      {[](Bench& b) { b.input.poses_frozen = true; }, Mode::hold, Reason::poses_frozen},
+      {[](Bench& b) { b.input.consecutive_overruns = 3; }, Mode::hold, Reason::overruns},
+      {[](Bench& b) { b.input.consecutive_overruns = 10; }, Mode::vent, Reason::many_overruns},
+      {[](Bench& b) { b.input.soft_limit_exceeded = true; }, Mode::vent, Reason::soft_limit},
+      {[](Bench& b) { b.input.sender_restarted = true; }, Mode::vent, Reason::sender_restarted},
+      {[](Bench& b) { b.input.now_ns += 150 * kMs; }, Mode::vent, Reason::time_gap},
+      {[](Bench& b) { b.input.disarm = true; }, Mode::vent, Reason::disarmed},
+      {[](Bench& b) { b.input.shutdown = true; }, Mode::vent, Reason::shutdown},
+  };
+  for (const Row& row : rows) {
+    Bench bench;
+    bench.activate();
+    row.cause(bench);
+    EXPECT_EQ(bench.tick(), row.mode) << name(row.reason);
+    EXPECT_EQ(bench.monitor.reason(), row.reason) << name(row.reason);
+  }
+}
+
+TEST(SafetyMonitor, SilentValvesAreALatchedFault) {
+  Bench bench(Arming::automatic, true);
+  bench.activate();
+  for (int k = 0; k < 51; ++k) {
+    bench.tick();
+    bench.input.newest_measurement_ns = 0;
+  }
+  bench.input.now_ns += 2 * kMs;
+  bench.input.newest_measurement_ns = bench.input.now_ns - 101 * kMs;
+  EXPECT_EQ(bench.monitor.step(bench.input), Mode::fault);
+  bench.input.fully_vented = true;
+  EXPECT_EQ(bench.run(1000), Mode::fault) << "a fault is latched";
+  bench.input.disarm = true;
+  EXPECT_EQ(bench.tick(), Mode::vent);
+  EXPECT_EQ(bench.run(100), Mode::vent) << "disarmed";
+  bench.input.arm = true;
+  EXPECT_EQ(bench.tick(), Mode::active);
+}
+
+TEST(SafetyMonitor, TheMoreSevereCauseWins) {
+  Bench bench;
+  bench.activate();
+  bench.input.poses_frozen = true;
+  bench.input.shutdown = true;
+  EXPECT_EQ(bench.tick(), Mode::vent);
+  EXPECT_EQ(bench.monitor.reason(), Reason::shutdown);
+}
+
+TEST(SafetyMonitor, RandomSequencesNeverBreakTheInvariants) {
+  std::mt19937 random(7);
+  const auto chance = [&random](double p) { return std::bernoulli_distribution(p)(random); };
+  for (int sequence = 0; sequence < 200; ++sequence) {
+    Bench bench(chance(0.5) ? Arming::automatic : Arming::explicit_);
+    Mode before = Mode::init;
+    for (int k = 0; k < 1000; ++k) {
+      if (chance(0.01)) bench.frames_per_tick = 1 - bench.frames_per_tick;
+      bench.input.fully_vented = chance(0.5);
+      bench.input.poses_frozen = chance(0.005);
+      bench.input.sender_restarted = chance(0.002);
+      bench.input.arm = chance(0.02);
+      bench.input.disarm = chance(0.002);
+      const bool disarm = bench.input.disarm;
+      const bool restarted = bench.input.sender_restarted;
+      const Mode mode = bench.tick(chance(0.002) ? 200 * kMs : 2 * kMs);
+      const std::int64_t age = bench.input.now_ns - bench.input.newest_capture_ns;
+      if (mode == Mode::active) {
+        EXPECT_LE(age, 20 * kMs) << "active without fresh frames";
+        EXPECT_TRUE(bench.monitor.armed());
+        EXPECT_FALSE(disarm || restarted);
+      }
+      if (mode == Mode::active && before >= Mode::vent) {
+        EXPECT_TRUE(bench.input.fully_vented);
+      }
+      if (before == Mode::active || before == Mode::hold) {
+        if (age > 100 * kMs) {
+          EXPECT_GE(mode, Mode::vent);
+        }
+      }
+      before = mode;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace softarm
