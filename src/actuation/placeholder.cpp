@@ -1,1 +1,0 @@
-#include "softarm/actuation/settings.hpp"
