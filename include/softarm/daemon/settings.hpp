@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "softarm/estimation/clock_relation.hpp"
+
 namespace softarm {
 
 enum class Arming {
@@ -35,12 +37,9 @@ struct RealtimeSettings {
   bool lock_memory = false;
 };
 
-/// How a frame's capture time is brought to our monotonic clock.
-enum class CaptureTime {
-  sender,  ///< the sender's clock, its offset to ours estimated from the earliest arrivals, plus
-           ///< frame_latency_s
-  latency  ///< arrival minus frame_latency_s
-};
+/// How a frame's capture time is brought to our monotonic clock; `frame_latency_s` is the declared
+/// latency of either way.
+using CaptureTime = ClockMode;
 
 struct LcmSettings {
   std::string url = "udpm://239.255.76.67:7667?ttl=0";

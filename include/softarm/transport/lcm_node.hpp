@@ -1,0 +1,67 @@
+// One LCM handle: subscribe, drain without waiting, publish from a buffer of our own.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+struct _lcm_t;
+
+namespace softarm {
+
+/// LCM could not be started or used; the message tells the cure.
+class TransportError : public std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+/// A received packet; valid only during the handler.
+struct ReceivedMessage {
+  std::span<const std::byte> bytes;
+  std::int64_t arrival_utime_us;  ///< wall clock, taken by LCM's receive thread
+};
+
+/// Belongs to one thread. The C interface of LCM serves underneath, because the C++ one allocates
+/// for every message.
+class LcmNode {
+ public:
+  using Handler = std::function<void(const ReceivedMessage&)>;
+
+  /// @throws TransportError if LCM refuses the URL or no multicast route exists
+  explicit LcmNode(const std::string& url);
+  ~LcmNode();
+  LcmNode(const LcmNode&) = delete;
+  LcmNode& operator=(const LcmNode&) = delete;
+
+  /// Handlers must not throw. A full queue drops the newest messages, so `capacity` must cover what
+  /// can arrive between two drains. @throws TransportError
+  void subscribe(const std::string& channel, int capacity, Handler handler);
+
+  /// Handles what has arrived, at most `limit` messages, without waiting. Returns how many were
+  /// handled.
+  int drain(int limit) noexcept;
+
+  /// Waits up to `timeout_ms` for one message and handles it. Returns whether there was one.
+  bool wait(int timeout_ms) noexcept;
+
+  /// Encodes into this node's buffer and publishes; false if it did not fit or was refused.
+  /// Allocates nothing.
+  template <class Message>
+  bool publish(const std::string& channel, const Message& message) noexcept {
+    const int size = message.encode(buffer_.data(), 0, static_cast<int>(buffer_.size()));
+    return size >= 0 && send(channel.c_str(), size);
+  }
+
+ private:
+  bool send(const char* channel, int size) noexcept;
+
+  _lcm_t* lcm_ = nullptr;
+  std::deque<Handler> handlers_;  // stable addresses: LCM keeps a pointer to each
+  std::vector<std::byte> buffer_;
+};
+
+}  // namespace softarm

@@ -1,0 +1,35 @@
+// Bytes from the network -> messages. LCM's generated decoders trust the lengths they read and
+// accept trailing bytes, so every size is checked here before they run.
+#pragma once
+
+#include <cstddef>
+#include <softarm_messages/controller_status_t.hpp>
+#include <softarm_messages/curvature_reference_t.hpp>
+#include <softarm_messages/mocap_frame_t.hpp>
+#include <softarm_messages/operator_command_t.hpp>
+#include <softarm_messages/plant_state_t.hpp>
+#include <softarm_messages/pressure_command_t.hpp>
+#include <softarm_messages/pressure_measurement_t.hpp>
+#include <softarm_messages/timing_t.hpp>
+#include <span>
+
+namespace softarm {
+
+/// False, and `message` unspecified, unless `bytes` are exactly one message of this type: right
+/// hash, lengths within this project's capacities, no byte missing and none left over. Values are
+/// not judged. Allocates nothing once `message` has held one of its size.
+bool decode(std::span<const std::byte> bytes, softarm_messages::mocap_frame_t& message) noexcept;
+bool decode(std::span<const std::byte> bytes,
+            softarm_messages::pressure_command_t& message) noexcept;
+bool decode(std::span<const std::byte> bytes,
+            softarm_messages::pressure_measurement_t& message) noexcept;
+bool decode(std::span<const std::byte> bytes,
+            softarm_messages::curvature_reference_t& message) noexcept;
+bool decode(std::span<const std::byte> bytes,
+            softarm_messages::operator_command_t& message) noexcept;
+bool decode(std::span<const std::byte> bytes,
+            softarm_messages::controller_status_t& message) noexcept;
+bool decode(std::span<const std::byte> bytes, softarm_messages::plant_state_t& message) noexcept;
+bool decode(std::span<const std::byte> bytes, softarm_messages::timing_t& message) noexcept;
+
+}  // namespace softarm

@@ -1,0 +1,64 @@
+#include "softarm/transport/lcm_node.hpp"
+
+#include <lcm/lcm.h>
+
+#include <cctype>
+
+namespace softarm {
+namespace {
+
+constexpr std::size_t kLargestMessage = 60'000;  // the largest UDP payload, less LCM's header
+
+/// LCM takes channel names for regular expressions; we mean them literally.
+std::string quoted(const std::string& channel) {
+  std::string pattern;
+  for (const char c : channel) {
+    if (std::isalnum(static_cast<unsigned char>(c)) == 0 && c != '_') pattern += '\\';
+    pattern += c;
+  }
+  return pattern;
+}
+
+void dispatch(const lcm_recv_buf_t* packet, const char* /*channel*/, void* user) {
+  // A packet with an unterminated channel name has been seen to claim 2^32 - 1 bytes.
+  if (packet->data == nullptr || packet->data_size > kLargestMessage) return;
+  const auto& handler = *static_cast<const LcmNode::Handler*>(user);
+  handler({.bytes = {static_cast<const std::byte*>(packet->data), packet->data_size},
+           .arrival_utime_us = packet->recv_utime});
+}
+
+}  // namespace
+
+LcmNode::LcmNode(const std::string& url) : lcm_(lcm_create(url.c_str())), buffer_(kLargestMessage) {
+  if (lcm_ == nullptr)
+    throw TransportError("LCM cannot start on \"" + url +
+                         "\". Without a multicast route give this machine one: "
+                         "ip link set lo up; ip route add 224.0.0.0/4 dev lo");
+}
+
+LcmNode::~LcmNode() { lcm_destroy(lcm_); }
+
+void LcmNode::subscribe(const std::string& channel, int capacity, Handler handler) {
+  Handler& stored = handlers_.emplace_back(std::move(handler));
+  lcm_subscription_t* subscription =
+      lcm_subscribe(lcm_, quoted(channel).c_str(), dispatch, &stored);
+  if (subscription == nullptr)
+    throw TransportError("LCM cannot subscribe to \"" + channel +
+                         "\". Without a multicast route give this machine one: "
+                         "ip link set lo up; ip route add 224.0.0.0/4 dev lo");
+  lcm_subscription_set_queue_capacity(subscription, capacity);
+}
+
+int LcmNode::drain(int limit) noexcept {
+  int handled = 0;
+  while (handled < limit && wait(0)) ++handled;
+  return handled;
+}
+
+bool LcmNode::wait(int timeout_ms) noexcept { return lcm_handle_timeout(lcm_, timeout_ms) > 0; }
+
+bool LcmNode::send(const char* channel, int size) noexcept {
+  return lcm_publish(lcm_, channel, buffer_.data(), static_cast<unsigned int>(size)) == 0;
+}
+
+}  // namespace softarm

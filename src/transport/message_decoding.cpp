@@ -1,0 +1,110 @@
+#include "softarm/transport/message_decoding.hpp"
+
+#include <cstdint>
+
+#include "softarm/actuation/pressure_allocator.hpp"
+#include "softarm/estimation/mocap_frame.hpp"
+
+namespace softarm {
+namespace {
+
+constexpr std::size_t kHash = 8;
+constexpr std::size_t kLongestVersion = 256;
+
+/// A big-endian 16 or 32 bit length at `offset`; -1 where the bytes end before it.
+int length16_at(std::span<const std::byte> bytes, std::size_t offset) noexcept {
+  if (bytes.size() < offset + 2) return -1;
+  const auto high = std::to_integer<unsigned>(bytes[offset]);
+  const auto low = std::to_integer<unsigned>(bytes[offset + 1]);
+  return static_cast<std::int16_t>(high << 8 | low);
+}
+
+std::int64_t length32_at(std::span<const std::byte> bytes, std::size_t offset) noexcept {
+  if (bytes.size() < offset + 4) return -1;
+  std::uint32_t value = 0;
+  for (std::size_t k = 0; k < 4; ++k)
+    value = value << 8 | std::to_integer<std::uint32_t>(bytes[offset + k]);
+  return static_cast<std::int32_t>(value);
+}
+
+/// A length within [0, limit], or -1.
+int bounded(int length, int limit) noexcept { return length <= limit ? length : -1; }
+
+template <class Message>
+bool decode_exactly(std::span<const std::byte> bytes, std::size_t expected,
+                    Message& message) noexcept {
+  return bytes.size() == expected &&
+         message.decode(bytes.data(), 0, static_cast<int>(bytes.size())) ==
+             static_cast<int>(bytes.size());
+}
+
+/// A message whose only length is a 16 bit one after `fixed` bytes, followed by that many elements
+/// of `element` bytes.
+template <class Message>
+bool decode_list(std::span<const std::byte> bytes, std::size_t fixed, std::size_t element,
+                 int limit, Message& message) noexcept {
+  const int length = bounded(length16_at(bytes, kHash + fixed), limit);
+  return length >= 0 &&
+         decode_exactly(bytes, kHash + fixed + 2 + element * static_cast<std::size_t>(length),
+                        message);
+}
+
+}  // namespace
+
+bool decode(std::span<const std::byte> bytes, softarm_messages::mocap_frame_t& message) noexcept {
+  constexpr std::size_t kBody = 4 + 1 + 3 * 8 + 4 * 8;
+  return decode_list(bytes, 8 + 8, kBody, 4 * kMaxBodies, message);  // other bodies may be in view
+}
+
+bool decode(std::span<const std::byte> bytes,
+            softarm_messages::pressure_command_t& message) noexcept {
+  return decode_list(bytes, 8 + 8 + 4 + 1, 4, kMaxChambers, message);
+}
+
+bool decode(std::span<const std::byte> bytes,
+            softarm_messages::pressure_measurement_t& message) noexcept {
+  return decode_list(bytes, 8 + 8, 4, kMaxChambers, message);
+}
+
+bool decode(std::span<const std::byte> bytes,
+            softarm_messages::curvature_reference_t& message) noexcept {
+  return decode_list(bytes, 8, 3 * 8, 2 * kMaxSegments, message);
+}
+
+bool decode(std::span<const std::byte> bytes,
+            softarm_messages::operator_command_t& message) noexcept {
+  return decode_exactly(bytes, kHash + 8 + 1, message);
+}
+
+bool decode(std::span<const std::byte> bytes,
+            softarm_messages::controller_status_t& message) noexcept {
+  constexpr std::size_t kBeforeVersion = 5 * 8;
+  const std::int64_t version = length32_at(bytes, kHash + kBeforeVersion);
+  if (version < 1 || version > static_cast<std::int64_t>(kLongestVersion)) return false;
+  const std::size_t counts =
+      kHash + kBeforeVersion + 4 + static_cast<std::size_t>(version) + 4 + 4 + 6 * 4;
+  const int segments = bounded(length16_at(bytes, counts), kMaxSegments);
+  const int chambers = bounded(length16_at(bytes, counts + 2), kMaxChambers);
+  if (segments < 0 || chambers < 0) return false;
+  constexpr std::size_t kSegment = 12 * 4;
+  return decode_exactly(bytes,
+                        counts + 4 + kSegment * static_cast<std::size_t>(segments) +
+                            4 * static_cast<std::size_t>(chambers),
+                        message);
+}
+
+bool decode(std::span<const std::byte> bytes, softarm_messages::plant_state_t& message) noexcept {
+  const int segments = bounded(length16_at(bytes, kHash + 8 + 1), kMaxSegments);
+  const int chambers = bounded(length16_at(bytes, kHash + 8 + 1 + 2), kMaxChambers);
+  if (segments < 0 || chambers < 0) return false;
+  return decode_exactly(bytes,
+                        kHash + 8 + 1 + 4 + 4 * 8 * static_cast<std::size_t>(segments) +
+                            4 * static_cast<std::size_t>(chambers) + 3 * 8,
+                        message);
+}
+
+bool decode(std::span<const std::byte> bytes, softarm_messages::timing_t& message) noexcept {
+  return decode_exactly(bytes, kHash + 3 * 8 + 4 * 32 * 4 + 4 * 4, message);
+}
+
+}  // namespace softarm

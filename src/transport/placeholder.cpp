@@ -1,1 +1,0 @@
-#include "softarm/daemon/settings.hpp"
