@@ -1,4 +1,4 @@
-// What an experiment may choose about sensing: the estimator, the filter, the checks a frame must pass.
+// What an experiment may choose about sensing: the estimator, the filter, the checks of a frame.
 #pragma once
 
 namespace softarm {
@@ -11,10 +11,12 @@ enum class CurvatureMethod {
 
 struct EstimationSettings {
   CurvatureMethod method = CurvatureMethod::pose;
-  double position_noise_m = 0.2e-3;       ///< standard deviation an axis of every measured body
-  double orientation_noise_rad = 3.5e-3;  ///< standard deviation of the rotation vector an axis of every measured body
-  double filter_bandwidth_radps = 30.0;   ///< of the velocity filter on u
-  int predicted_frames = 3;               ///< frames an occluded segment may be predicted for
+  /// Standard deviations an axis of every measured body: of its position, and of its rotation
+  /// vector.
+  double position_noise_m = 0.2e-3;
+  double orientation_noise_rad = 3.5e-3;
+  double filter_bandwidth_radps = 30.0;  ///< of the filter on u and u'
+  int predicted_frames = 3;              ///< frames an occluded segment may be predicted for
 
   // A frame is rejected where it violates one of these.
   double quaternion_tolerance = 0.02;  ///< | |q| - 1 |

@@ -1,0 +1,53 @@
+#include "softarm/estimation/clock_relation.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+namespace softarm {
+namespace {
+constexpr std::int64_t kBucketNs = 200'000'000;
+constexpr std::int64_t kMaxStampUs = 4'000'000'000'000'000;
+}  // namespace
+
+ClockRelation::ClockRelation(ClockMode mode, double latency_s)
+    : mode_(mode), latency_ns_(std::llround(latency_s * 1e9)) {
+  if (!(latency_s >= 0.0) || !(latency_s < 1e6)) {
+    throw std::invalid_argument(fmt::format("expected a latency >= 0 s, got {}", latency_s));
+  }
+}
+
+void ClockRelation::reset() noexcept {
+  bucket_.fill(Bucket{});
+  has_stamp_ = false;
+}
+
+std::int64_t ClockRelation::capture_ns(std::int64_t arrival_ns, std::int64_t sender_us) noexcept {
+  if (mode_ == ClockMode::latency || sender_us > kMaxStampUs || sender_us < -kMaxStampUs) {
+    return arrival_ns - latency_ns_;
+  }
+  if (has_stamp_ && sender_us < last_sender_us_) {
+    ++clock_jumps_;
+    reset();
+  }
+  has_stamp_ = true;
+  last_sender_us_ = sender_us;
+
+  const std::int64_t sender_ns = 1000 * sender_us;
+  const std::int64_t offset_ns = arrival_ns - sender_ns;
+  const std::int64_t period = arrival_ns / kBucketNs;
+  Bucket& newest = bucket_[static_cast<std::size_t>(period % kBuckets)];
+  newest = newest.period == period ? Bucket{period, std::min(newest.least_ns, offset_ns)}
+                                   : Bucket{period, offset_ns};
+  std::int64_t least_ns = offset_ns;
+  for (const Bucket& bucket : bucket_) {
+    if (bucket.period > period - kBuckets && bucket.period <= period && bucket.period >= 0) {
+      least_ns = std::min(least_ns, bucket.least_ns);
+    }
+  }
+  return sender_ns + least_ns - latency_ns_;
+}
+
+}  // namespace softarm

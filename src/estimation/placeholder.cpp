@@ -1,1 +1,0 @@
-#include "softarm/estimation/settings.hpp"
