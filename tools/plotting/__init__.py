@@ -1,0 +1,1 @@
+"""Plots and report of one run."""
