@@ -45,7 +45,7 @@ class DurationHistogram {
   static int bucket(std::int64_t duration_ns) noexcept {
     if (duration_ns < 1000) return 0;
     const auto us = static_cast<std::uint64_t>(duration_ns) / 1000;
-    const int octave = std::bit_width(us) - 1;
+    const int octave = static_cast<int>(std::bit_width(us)) - 1;
     const bool upper_half =
         static_cast<double>(duration_ns) * 1e-3 >= bucket_edge_us(2 * octave + 1);
     const int k = 2 * octave + (upper_half ? 1 : 0);

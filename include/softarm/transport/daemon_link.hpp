@@ -1,0 +1,95 @@
+// The daemon's side of LCM: what came in since the last tick, and what goes out after it.
+#pragma once
+
+#include <cstdint>
+#include <softarm_messages/controller_status_t.hpp>
+#include <softarm_messages/curvature_reference_t.hpp>
+#include <softarm_messages/mocap_frame_t.hpp>
+#include <softarm_messages/operator_command_t.hpp>
+#include <softarm_messages/pressure_command_t.hpp>
+#include <softarm_messages/pressure_measurement_t.hpp>
+#include <softarm_messages/timing_t.hpp>
+#include <string>
+#include <vector>
+
+#include "softarm/daemon/control_pipeline.hpp"
+#include "softarm/daemon/histogram.hpp"
+#include "softarm/estimation/clock_relation.hpp"
+#include "softarm/transport/lcm_node.hpp"
+#include "softarm/transport/mocap_adapter.hpp"
+
+namespace softarm {
+
+/// Who is speaking: told in every status message.
+struct Provenance {
+  std::string version;  ///< release and commit
+  std::uint64_t configuration_hash = 0;
+  std::uint64_t seed = 0;
+};
+
+/// The four durations the daemon measures of itself.
+struct LoopTiming {
+  DurationHistogram lateness;   ///< wake-up after the deadline
+  DurationHistogram frame_age;  ///< capture of the newest frame to the tick
+  DurationHistogram tick;       ///< from wake-up to the command
+  DurationHistogram publish;    ///< publishing command and status
+  std::int64_t ticks = 0;
+  std::int64_t overruns = 0;
+};
+
+/// Belongs to the tick's thread. After construction nothing here allocates, waits or throws.
+class DaemonLink {
+ public:
+  /// @throws TransportError
+  DaemonLink(const PipelineSettings& settings, Provenance provenance, bool shadow);
+
+  /// Handles what has arrived, a bounded number of messages. The frames it points to live until the
+  /// next call.
+  TickInput collect(std::int64_t now_ns) noexcept;
+
+  void publish_command(std::int64_t now_ns, const TickOutput& output) noexcept;
+  void publish_status(std::int64_t now_ns, const ControlPipeline& pipeline,
+                      const LoopTiming& timing) noexcept;
+  void publish_timing(std::int64_t now_ns, const LoopTiming& timing) noexcept;
+
+  /// Messages refused before decoding, and publications that failed.
+  std::int64_t malformed() const noexcept { return malformed_; }
+  std::int64_t unsent() const noexcept { return unsent_; }
+
+ private:
+  void take_frame(const ReceivedMessage& packet) noexcept;
+  void take_reference(const ReceivedMessage& packet) noexcept;
+  void take_operator(const ReceivedMessage& packet) noexcept;
+  void take_measurement(const ReceivedMessage& packet) noexcept;
+  std::int64_t arrival_ns(const ReceivedMessage& packet) const noexcept;
+
+  DaemonSettings settings_;
+  MocapAdapter adapter_;
+  ClockRelation clock_;
+  LcmNode node_;
+  int dof_;
+
+  // What the handlers fill during collect().
+  std::vector<MocapFrame> frames_;
+  std::size_t frame_count_ = 0;
+  LiveReferenceInput reference_;
+  TickInput input_;
+  std::int64_t now_ns_ = 0;
+  std::int64_t wall_minus_monotonic_ns_ = 0;
+  std::int64_t previous_collect_ns_ = 0;
+  std::int64_t newest_measurement_ns_;
+  std::int64_t reference_sequence_;
+  std::int64_t operator_sequence_;
+  std::int64_t malformed_ = 0;
+  std::int64_t unsent_ = 0;
+
+  softarm_messages::mocap_frame_t frame_message_;
+  softarm_messages::curvature_reference_t reference_message_;
+  softarm_messages::operator_command_t operator_message_;
+  softarm_messages::pressure_measurement_t measurement_message_;
+  softarm_messages::pressure_command_t command_message_;
+  softarm_messages::controller_status_t status_message_;
+  softarm_messages::timing_t timing_message_;
+};
+
+}  // namespace softarm
