@@ -7,11 +7,14 @@
 
 namespace softarm {
 
-/// Capacity of the fixed-size types used inside the control loop; the number of segments itself is chosen at run time.
+/// Capacity of the fixed-size types used inside the control loop; the number of segments itself is
+/// chosen at run time.
 inline constexpr int kMaxSegments = 64;
 
-/// Two numbers a segment, [u1_x, u1_y, u2_x, u2_y, ...]. Run-time size, storage in place: copying it never allocates.
-using SegmentVector = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, 2 * kMaxSegments, 1>;
+/// Two numbers a segment, [u1_x, u1_y, u2_x, u2_y, ...]. Run-time size, storage in place: copying
+/// it never allocates.
+using SegmentVector =
+    Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, 2 * kMaxSegments, 1>;
 using ConstVectorRef = const Eigen::Ref<const Eigen::VectorXd>&;
 using VectorRef = Eigen::Ref<Eigen::VectorXd>;
 
@@ -23,15 +26,17 @@ struct SegmentParameters {
   double damping_nms_per_rad = 0.029;   ///< beta of (14)
 };
 
-/// Where a segment's mass sits. `point` is the paper's (all of it at the centre of mass, no rotational inertia);
-/// `distributed` spreads it homogeneously along the arc.
+/// Where a segment's mass sits. `point` is the paper's (all of it at the centre of mass, no
+/// rotational inertia); `distributed` spreads it homogeneously along the arc.
 enum class MassModel { point, distributed };
 
-/// Which input matrix A maps tau_A to generalized forces: `couple` is the paper's (15) with its transpose mended
-/// (singular at theta = pi), `chamber` the body-following moment of chambers and tendons (never singular).
+/// Which input matrix A maps tau_A to generalized forces: `couple` is the paper's (15) with its
+/// transpose mended (singular at theta = pi), `chamber` the body-following moment of chambers and
+/// tendons (never singular).
 enum class ActuationModel { chamber, couple };
 
-/// An arm of n segments hanging from, or standing on, a base frame S_0. The straight arm points along +z of S_0.
+/// An arm of n segments hanging from, or standing on, a base frame S_0. The straight arm points
+/// along +z of S_0.
 struct ArmParameters {
   std::vector<SegmentParameters> segments;
   MassModel mass = MassModel::distributed;

@@ -1,0 +1,131 @@
+#include "softarm/model/dynamics.hpp"
+
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <string>
+
+#include "model/dynamics_storage.hpp"
+#include "softarm/model/kinematics.hpp"
+
+namespace softarm {
+
+DynamicsWorkspace::Storage::Storage(int segments)
+    : forces(static_cast<std::size_t>(segments)),
+      columns(static_cast<std::size_t>(segments)),
+      zeros(Eigen::VectorXd::Zero(2 * segments)),
+      bias(2 * segments),
+      scale(2 * segments),
+      rhs(2 * segments),
+      solution(2 * segments),
+      residual(2 * segments),
+      B(2 * segments, 2 * segments),
+      factor(2 * segments, 2 * segments) {}
+
+DynamicsWorkspace::DynamicsWorkspace(int segments) {
+  if (segments < 1) {
+    throw std::invalid_argument("DynamicsWorkspace: expected at least one segment, got " +
+                                std::to_string(segments));
+  }
+  storage_ = std::make_unique<Storage>(segments);
+}
+DynamicsWorkspace::DynamicsWorkspace(const ArmParameters& arm) : DynamicsWorkspace(arm.size()) {}
+DynamicsWorkspace::~DynamicsWorkspace() = default;
+DynamicsWorkspace::DynamicsWorkspace(DynamicsWorkspace&&) noexcept = default;
+DynamicsWorkspace& DynamicsWorkspace::operator=(DynamicsWorkspace&&) noexcept = default;
+
+namespace {
+
+/// L L' = A in the lower triangle of A, in place. False where a pivot is not positive (a NaN is
+/// not).
+bool cholesky(Eigen::Ref<Eigen::MatrixXd> A) noexcept {
+  const Eigen::Index n = A.rows();
+  for (Eigen::Index j = 0; j < n; ++j) {
+    for (Eigen::Index k = 0; k < j; ++k) {
+      const double factor = A(j, k);
+      for (Eigen::Index i = j; i < n; ++i) A(i, j) -= A(i, k) * factor;
+    }
+    if (!(A(j, j) > 0.0) || !std::isfinite(A(j, j))) return false;
+    const double pivot = std::sqrt(A(j, j));
+    for (Eigen::Index i = j; i < n; ++i) A(i, j) /= pivot;
+  }
+  return true;
+}
+
+/// x := (L L')^-1 x.
+void substitute(const Eigen::Ref<const Eigen::MatrixXd>& L,
+                Eigen::Ref<Eigen::VectorXd> x) noexcept {
+  const Eigen::Index n = L.rows();
+  for (Eigen::Index j = 0; j < n; ++j) {
+    x(j) /= L(j, j);
+    for (Eigen::Index i = j + 1; i < n; ++i) x(i) -= L(i, j) * x(j);
+  }
+  for (Eigen::Index j = n - 1; j >= 0; --j) {
+    for (Eigen::Index i = j + 1; i < n; ++i) x(j) -= L(i, j) * x(i);
+    x(j) /= L(j, j);
+  }
+}
+
+}  // namespace
+
+bool solve_inertia(DynamicsWorkspace& workspace, const Eigen::Ref<const Eigen::MatrixXd>& B,
+                   ConstVectorRef rhs, VectorRef x) noexcept {
+  auto& s = workspace.storage();
+  const Eigen::Index n = B.rows();
+  // Unit diagonal: segments of very different mass, or polar's theta^2 rows, must not decide the
+  // rounding.
+  for (Eigen::Index i = 0; i < n; ++i) s.scale(i) = 1.0 / std::sqrt(B(i, i));
+  for (Eigen::Index j = 0; j < n; ++j) {
+    for (Eigen::Index i = 0; i < n; ++i) s.factor(i, j) = B(i, j) * s.scale(i) * s.scale(j);
+    s.rhs(j) = rhs(j) * s.scale(j);
+    s.solution(j) = s.rhs(j);
+  }
+  if (!cholesky(s.factor)) {
+    x.setConstant(std::numeric_limits<double>::quiet_NaN());
+    return false;
+  }
+  substitute(s.factor, s.solution);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    long double sum = s.rhs(i);
+    for (Eigen::Index j = 0; j < n; ++j) {
+      sum -= static_cast<long double>(B(i, j) * s.scale(i) * s.scale(j)) * s.solution(j);
+    }
+    s.residual(i) = static_cast<double>(sum);
+  }
+  substitute(s.factor, s.residual);
+  for (Eigen::Index i = 0; i < n; ++i) x(i) = (s.solution(i) + s.residual(i)) * s.scale(i);
+  return true;
+}
+
+bool forward_dynamics(const ArmParameters& arm, DynamicsWorkspace& workspace, ConstVectorRef u,
+                      ConstVectorRef velocity, ConstVectorRef generalized_force,
+                      VectorRef acceleration) noexcept {
+  auto& s = workspace.storage();
+  inertia_matrix(arm, workspace, u, s.B);
+  inverse_dynamics(arm, workspace, u, velocity, velocity, s.zeros,
+                   {.inertia = false, .coriolis = true, .gravity = true}, s.bias);
+  add_impedance(arm, u, velocity, s.bias);
+  s.bias = generalized_force - s.bias;
+  return solve_inertia(workspace, s.B, s.bias, acceleration);
+}
+
+double kinetic_energy(const ArmParameters& arm, DynamicsWorkspace& workspace, ConstVectorRef u,
+                      ConstVectorRef velocity) noexcept {
+  auto& s = workspace.storage();
+  inverse_dynamics(arm, workspace, u, s.zeros, s.zeros, velocity,
+                   {.inertia = true, .coriolis = false, .gravity = false}, s.bias);
+  return 0.5 * velocity.dot(s.bias);
+}
+
+void add_impedance(const ArmParameters& arm, ConstVectorRef u, ConstVectorRef velocity,
+                   VectorRef generalized_force) noexcept {
+  for (int i = 0; i < arm.size(); ++i) {
+    const SegmentParameters& segment = arm.segments[static_cast<std::size_t>(i)];
+    for (int k = 2 * i; k < 2 * i + 2; ++k) {
+      generalized_force(k) +=
+          segment.stiffness_nm_per_rad * u(k) + segment.damping_nms_per_rad * velocity(k);
+    }
+  }
+}
+
+}  // namespace softarm

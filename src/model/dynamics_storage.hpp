@@ -1,0 +1,45 @@
+// What the recursions keep of every segment between their passes.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "model/segment_geometry.hpp"
+#include "softarm/model/dynamics.hpp"
+
+namespace softarm {
+
+/// Inverse dynamics: what the pass from base to tip leaves for the way back. All in S_{i-1}.
+struct SegmentForces {
+  double ux, uy;
+  Curve tip;
+  Spin turn_rate;
+  Turn turn;
+  Vector3 force;   ///< of the segment's own mass
+  Vector3 moment;  ///< of the segment's own mass, about its base p_{i-1}
+  Pair torque;     ///< of the segment's own mass, on its own u
+};
+
+/// Full matrices: a segment's columns, all in S_{i-1}. A dot is a time derivative in the world,
+/// seen from S_{i-1}.
+struct SegmentColumns {
+  double ux, uy;
+  Turn turn;
+  Vector3 tip;                                ///< p_i - p_{i-1}
+  Vector3 tip_rate;                           ///< its rate
+  Vector3 spin;                               ///< angular velocity of S_{i-1}
+  PairVector3 translation, translation_rate;  ///< of the tip p_i for unit u_x', u_y'
+  PairVector3 rotation, rotation_rate;        ///< of S_i
+  Vector3 gravity;
+};
+
+struct DynamicsWorkspace::Storage {
+  explicit Storage(int segments);
+
+  std::vector<SegmentForces> forces;
+  std::vector<SegmentColumns> columns;
+  Eigen::VectorXd zeros, bias, scale, rhs, solution, residual;
+  Eigen::MatrixXd B, factor;
+};
+
+}  // namespace softarm

@@ -1,0 +1,54 @@
+// Vectors of three for the hot loops. A component is a double, or a Pair holding the two columns
+// u_x, u_y of a segment side by side, so that what is done to both columns is done once and in one
+// register.
+#pragma once
+
+#include <Eigen/Core>
+
+namespace softarm {
+
+using Pair = double __attribute__((vector_size(16)));
+
+template <class T>
+struct Vec3 {
+  T x, y, z;
+
+  template <class S>
+  Vec3& operator+=(const Vec3<S>& v) noexcept {
+    x += v.x;
+    y += v.y;
+    z += v.z;
+    return *this;
+  }
+};
+
+using Vector3 = Vec3<double>;
+using PairVector3 = Vec3<Pair>;
+
+template <class S, class T>
+inline auto operator+(const Vec3<S>& a, const Vec3<T>& b) noexcept {
+  return Vec3<decltype(a.x + b.x)>{a.x + b.x, a.y + b.y, a.z + b.z};
+}
+template <class S, class T>
+inline auto operator-(const Vec3<S>& a, const Vec3<T>& b) noexcept {
+  return Vec3<decltype(a.x - b.x)>{a.x - b.x, a.y - b.y, a.z - b.z};
+}
+template <class S, class T>
+inline auto operator*(const S& a, const Vec3<T>& b) noexcept {
+  return Vec3<decltype(a * b.x)>{a * b.x, a * b.y, a * b.z};
+}
+template <class S, class T>
+inline auto dot(const Vec3<S>& a, const Vec3<T>& b) noexcept {
+  return a.x * b.x + a.y * b.y + a.z * b.z;
+}
+template <class S, class T>
+inline auto cross(const Vec3<S>& a, const Vec3<T>& b) noexcept {
+  using R = decltype(a.x * b.x);
+  return Vec3<R>{a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+inline Vector3 column(const PairVector3& v, int k) noexcept { return {v.x[k], v.y[k], v.z[k]}; }
+
+inline Vector3 from_eigen(const Eigen::Vector3d& v) noexcept { return {v.x(), v.y(), v.z()}; }
+inline Eigen::Vector3d to_eigen(const Vector3& v) noexcept { return {v.x, v.y, v.z}; }
+
+}  // namespace softarm
