@@ -174,7 +174,8 @@ FrameVerdict FrameValidator::judge_segments(const MocapFrame& frame) noexcept {
   bool any = false;
   bool jumped = false;
   for (std::size_t i = 0; i < length_m_.size(); ++i) {
-    if (!candidate_.valid[i]) continue;
+    if (!frame.body[i].valid || !frame.body[i + 1].valid) continue;
+    if (!candidate_.valid[i]) return FrameVerdict::bad_length;
     any = true;
     const double chord = (frame.body[i + 1].position_m - frame.body[i].position_m).norm();
     // Inertial sensors leave the positions at zero.

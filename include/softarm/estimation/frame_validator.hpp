@@ -20,7 +20,7 @@ enum class FrameVerdict {
   wrong_size,        ///< not the number of segments of the arm
   not_finite,        ///< NaN or infinity in a body that claims to be valid
   bad_quaternion,    ///< norm off one by more than quaternion_tolerance
-  bad_length,        ///< chord of a segment that no bend explains: wrong or swapped bodies
+  bad_length,        ///< chord or pose of a segment that no bend explains: wrong or swapped bodies
   jump,              ///< u moved faster than max_speed_radps
   not_seen           ///< no segment has both its ends
 };
