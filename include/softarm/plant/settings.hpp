@@ -9,20 +9,42 @@
 
 namespace softarm {
 
-/// First-order valves between a commanded and a real pressure. Left out (lag 0): the command is the pressure.
+/// First-order valves between a commanded and a real pressure. Left out (lag 0): the command is the
+/// pressure.
 struct ValveSettings {
-  double lag_s = 0.0;               ///< time constant
-  double supply_pressure_bar = 2.0; ///< no pressure above it
+  double lag_s = 0.0;                ///< time constant
+  double supply_pressure_bar = 2.0;  ///< no pressure above it
 };
 
 /// Simulated motion capture.
 struct MocapSettings {
   double rate_hz = 200.0;
-  double latency_s = 0.0;                ///< from capture to arrival of the message
-  double position_noise_m = 0.0;         ///< standard deviation an axis of every body
-  double orientation_noise_rad = 0.0;    ///< standard deviation of the rotation vector an axis of every body
-  double dropout_probability = 0.0;      ///< of a whole frame, independent from frame to frame
-  bool noise_on_base = true;             ///< the base is a measured body too, unless it is fixed
+  double latency_s = 0.0;         ///< from capture to arrival of the message
+  double position_noise_m = 0.0;  ///< standard deviation an axis of every body
+  double orientation_noise_rad =
+      0.0;  ///< standard deviation of the rotation vector an axis of every body
+  double dropout_probability = 0.0;  ///< of a whole frame, independent from frame to frame
+  bool noise_on_base = true;         ///< the base is a measured body too, unless it is fixed
+};
+
+/// Which diagonally implicit Runge-Kutta method of ARKODE integrates (stiffly accurate, no explicit
+/// first stage).
+enum class IntegratorMethod {
+  sdirk2,  ///< two stages, order 2
+  cash4,   ///< Cash's five stages, order 4, embedded order 3
+  sdirk4   ///< Hairer and Wanner's five stages, order 4, embedded order 3
+};
+
+/// The absolute tolerance of u' (rad/s) over that of u (rad), in 1/s.
+inline constexpr double kVelocityTolerance = 100.0;
+
+/// What the integrator has done so far.
+struct IntegratorCounters {
+  std::int64_t steps = 0;
+  std::int64_t rejected_steps = 0;
+  std::int64_t residual_evaluations = 0;  ///< Newton iterations of all stages
+  std::int64_t linearizations = 0;
+  std::int64_t retries = 0;  ///< calls that failed once and then succeeded
 };
 
 /// The simulated arm. Its `arm` and `actuation` may differ from what the controller believes.
@@ -31,10 +53,13 @@ struct PlantSettings {
   ActuationSettings actuation;
   ValveSettings valves;
   MocapSettings mocap;
-  SegmentVector initial_u_rad;              ///< at rest
-  Eigen::Vector3d tip_force_n = Eigen::Vector3d::Zero();  ///< constant external force at the tip, world frame
-  double relative_tolerance = 1e-6;         ///< of the SUNDIALS integrator
-  double absolute_tolerance = 1e-8;         ///< rad and rad/s
+  SegmentVector initial_u_rad;  ///< at rest
+  Eigen::Vector3d tip_force_n =
+      Eigen::Vector3d::Zero();  ///< constant external force at the tip, world frame
+  IntegratorMethod method = IntegratorMethod::sdirk4;
+  double relative_tolerance = 1e-6;  ///< of the SUNDIALS integrator
+  double absolute_tolerance = 1e-8;  ///< of u (rad); kVelocityTolerance times that of u' (rad/s)
+  bool account_energy = false;       ///< integrate work and dissipation along
   std::uint64_t seed = 1;
 };
 

@@ -1,0 +1,205 @@
+#include "softarm/plant/arm_plant.hpp"
+
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+#include "plant/arkode_integrator.hpp"
+#include "plant/pcc_system.hpp"
+#include "softarm/model/kinematics.hpp"
+
+namespace softarm {
+namespace {
+
+void expect(bool holds, const std::string& expected, const std::string& got) {
+  if (!holds) {
+    throw std::invalid_argument("plant: expected " + expected + ", got " + got);
+  }
+}
+
+int count_chambers(const ActuationSettings& actuation) {
+  std::size_t count = 0;
+  for (const auto& segment : actuation.segments) {
+    count += segment.size();
+  }
+  return static_cast<int>(count);
+}
+
+const PlantSettings& checked(const PlantSettings& settings) {
+  const int n = settings.arm.size();
+  expect(n >= 1 && n <= kMaxSegments, "1 to " + std::to_string(kMaxSegments) + " segments",
+         std::to_string(n));
+  expect(static_cast<int>(settings.actuation.segments.size()) == n,
+         "chambers for " + std::to_string(n) + " segments",
+         std::to_string(settings.actuation.segments.size()));
+  expect(settings.initial_u_rad.size() == 0 || settings.initial_u_rad.size() == 2 * n,
+         std::to_string(2 * n) + " numbers in initial_u",
+         std::to_string(settings.initial_u_rad.size()));
+  expect(settings.initial_u_rad.allFinite(), "finite numbers in initial_u", "others");
+  expect(settings.tip_force_n.allFinite(), "a finite tip force", "another");
+  expect(settings.arm.gravity_mps2.allFinite(), "finite gravity", "another");
+  for (const SegmentParameters& segment : settings.arm.segments) {
+    expect(std::isfinite(segment.length_m) && segment.length_m > 0.0, "lengths > 0 m",
+           std::to_string(segment.length_m));
+    expect(std::isfinite(segment.mass_kg) && segment.mass_kg > 0.0, "masses > 0 kg",
+           std::to_string(segment.mass_kg));
+    expect(std::isfinite(segment.stiffness_nm_per_rad) && segment.stiffness_nm_per_rad >= 0.0,
+           "stiffnesses >= 0 N m/rad", std::to_string(segment.stiffness_nm_per_rad));
+    expect(std::isfinite(segment.damping_nms_per_rad) && segment.damping_nms_per_rad >= 0.0,
+           "damping >= 0 N m s/rad", std::to_string(segment.damping_nms_per_rad));
+  }
+  for (const auto& segment : settings.actuation.segments) {
+    for (const Chamber& chamber : segment) {
+      expect(std::isfinite(chamber.angle_rad) && std::isfinite(chamber.gain_nm_per_bar),
+             "finite chamber angles and gains", "others");
+    }
+  }
+  return settings;
+}
+
+/// Columns -g (cos chi, sin chi) in the rows of the chamber's segment: pressures to generalized
+/// force of A_chamber.
+Eigen::MatrixXd chamber_map(const ActuationSettings& actuation) {
+  Eigen::MatrixXd map = Eigen::MatrixXd::Zero(
+      2 * static_cast<Eigen::Index>(actuation.segments.size()), count_chambers(actuation));
+  Eigen::Index column = 0;
+  Eigen::Index row = 0;
+  for (const auto& segment : actuation.segments) {
+    for (const Chamber& chamber : segment) {
+      map(row, column) = -chamber.gain_nm_per_bar * std::cos(chamber.angle_rad);
+      map(row + 1, column) = -chamber.gain_nm_per_bar * std::sin(chamber.angle_rad);
+      ++column;
+    }
+    row += 2;
+  }
+  return map;
+}
+
+IntegratorSettings integrator_settings(const PlantSettings& settings) {
+  return {.method = settings.method,
+          .relative_tolerance = settings.relative_tolerance,
+          .absolute_tolerance = settings.absolute_tolerance,
+          .absolute_tolerance_velocity = kVelocityTolerance * settings.absolute_tolerance,
+          .account_energy = settings.account_energy};
+}
+
+}  // namespace
+
+struct ArmPlant::Implementation {
+  explicit Implementation(const PlantSettings& settings)
+      : arm(checked(settings).arm),
+        lag_s(settings.valves.lag_s),
+        valves(settings.valves, count_chambers(settings.actuation)),
+        map(chamber_map(settings.actuation)),
+        system(settings),
+        integrator(system, integrator_settings(settings)),
+        present_nm(Eigen::VectorXd::Zero(arm.dof())),
+        target_nm(Eigen::VectorXd::Zero(arm.dof())) {
+    Eigen::VectorXd u = Eigen::VectorXd::Zero(arm.dof());
+    if (settings.initial_u_rad.size() > 0) {
+      u = settings.initial_u_rad;
+    }
+    drive();
+    integrator.reset(0.0, u, Eigen::VectorXd::Zero(arm.dof()));
+  }
+
+  /// Tells the equation of motion what the valves will do from now on.
+  void drive() {
+    present_nm.noalias() = map * valves.pressures_bar();
+    target_nm.noalias() = map * valves.commanded_bar();
+    system.drive(integrator.time_s(), present_nm, target_nm, lag_s);
+  }
+
+  ArmParameters arm;
+  double lag_s;
+  Valves valves;
+  Eigen::MatrixXd map;
+  mutable PccSystem system;  // energies use its workspace
+  ArkodeIntegrator integrator;
+  Eigen::VectorXd present_nm, target_nm;
+};
+
+ArmPlant::ArmPlant(const PlantSettings& settings)
+    : implementation_(std::make_unique<Implementation>(settings)) {}
+ArmPlant::~ArmPlant() = default;
+ArmPlant::ArmPlant(ArmPlant&&) noexcept = default;
+ArmPlant& ArmPlant::operator=(ArmPlant&&) noexcept = default;
+
+int ArmPlant::segments() const noexcept { return implementation_->arm.size(); }
+int ArmPlant::chambers() const noexcept { return implementation_->valves.size(); }
+
+void ArmPlant::command(std::span<const double> command_bar) noexcept {
+  implementation_->valves.command(command_bar);
+  implementation_->drive();
+}
+
+void ArmPlant::advance(double t_end_s) {
+  Implementation& self = *implementation_;
+  const double step_s = t_end_s - self.integrator.time_s();
+  if (!(step_s > 0.0)) {
+    return;
+  }
+  self.integrator.advance(t_end_s);
+  self.valves.advance(step_s);
+  self.drive();
+}
+
+void ArmPlant::advance(double t_end_s, std::span<const double> command_bar) {
+  command(command_bar);
+  advance(t_end_s);
+}
+
+void ArmPlant::reset(ConstVectorRef u_rad, ConstVectorRef velocity_radps,
+                     std::span<const double> pressure_bar) {
+  Implementation& self = *implementation_;
+  const int dof = self.arm.dof();
+  expect(u_rad.size() == dof && velocity_radps.size() == dof,
+         std::to_string(dof) + " numbers in u and velocity",
+         std::to_string(u_rad.size()) + " and " + std::to_string(velocity_radps.size()));
+  expect(static_cast<int>(pressure_bar.size()) == chambers(),
+         std::to_string(chambers()) + " pressures", std::to_string(pressure_bar.size()));
+  expect(u_rad.allFinite() && velocity_radps.allFinite(), "a finite state", "another");
+  self.valves.reset(pressure_bar);
+  self.drive();
+  self.integrator.reset(self.integrator.time_s(), u_rad, velocity_radps);
+}
+
+double ArmPlant::time_s() const noexcept { return implementation_->integrator.time_s(); }
+SegmentVector ArmPlant::u_rad() const noexcept { return implementation_->integrator.x(); }
+SegmentVector ArmPlant::velocity_radps() const noexcept { return implementation_->integrator.v(); }
+
+const Eigen::VectorXd& ArmPlant::pressures_bar() const noexcept {
+  return implementation_->valves.pressures_bar();
+}
+const Eigen::VectorXd& ArmPlant::commanded_bar() const noexcept {
+  return implementation_->valves.commanded_bar();
+}
+
+Eigen::Isometry3d ArmPlant::base() const noexcept {
+  Eigen::Isometry3d base = Eigen::Isometry3d::Identity();
+  base.linear() = implementation_->arm.base_rotation;
+  base.translation() = implementation_->arm.base_position_m;
+  return base;
+}
+
+void ArmPlant::segment_ends(std::span<Eigen::Isometry3d> segment_ends) const noexcept {
+  forward_kinematics(implementation_->arm, implementation_->integrator.x(), segment_ends);
+}
+
+Eigen::Vector3d ArmPlant::tip_m() const noexcept {
+  return tip_position(implementation_->arm, implementation_->integrator.x());
+}
+
+PlantEnergies ArmPlant::energies() const noexcept {
+  const Implementation& self = *implementation_;
+  return {.kinetic = self.system.kinetic_energy_j(self.integrator.x(), self.integrator.v()),
+          .potential = self.system.potential_energy_j(self.integrator.x()),
+          .supplied = self.integrator.supplied_j(),
+          .dissipated = self.integrator.dissipated_j()};
+}
+
+IntegratorCounters ArmPlant::counters() const noexcept {
+  return implementation_->integrator.counters();
+}
+
+}  // namespace softarm

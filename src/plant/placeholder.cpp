@@ -1,1 +1,0 @@
-#include "softarm/plant/settings.hpp"

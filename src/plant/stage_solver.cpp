@@ -1,0 +1,106 @@
+#include "plant/stage_solver.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace softarm {
+
+StageSolver::StageSolver(SecondOrderSystem& system) : system_(system) {
+  const Eigen::Index n = system.size();
+  for (Eigen::VectorXd* vector : {&x_, &v_, &a_, &guess_, &residual_, &correction_}) {
+    vector->setZero(n);
+  }
+  for (Eigen::MatrixXd* matrix : {&by_a_, &by_v_, &by_x_, &matrix_}) {
+    matrix->setZero(n, n);
+  }
+  lu_ = Eigen::PartialPivLU<Eigen::MatrixXd>(n);
+}
+
+void StageSolver::reset(SecondOrderSystem::ConstVector acceleration) {
+  a_ = acceleration;
+  linearized_ = false;
+}
+
+void StageSolver::place(const Stage& stage) {
+  v_.noalias() = stage.s_v + stage.gamma_s * a_;
+  x_.noalias() = stage.s_x + stage.gamma_s * v_;
+}
+
+void StageSolver::factorize(double gamma_s) {
+  matrix_.noalias() = by_a_ + gamma_s * (by_v_ + gamma_s * by_x_);
+  lu_.compute(matrix_);
+  gamma_s_ = gamma_s;
+  rate_ = 1.0;
+  rate_seen_ = false;
+}
+
+void StageSolver::linearize(const Stage& stage) {
+  system_.linearize(stage.t_s, x_, v_, a_, by_a_, by_v_, by_x_);
+  linearized_ = true;
+  age_ = 0;
+  ++linearizations_;
+  factorize(stage.gamma_s);
+}
+
+StageSolver::Outcome StageSolver::iterate(const Stage& stage) {
+  double previous = 0.0;
+  for (int iteration = 0; iteration < kMaxIterations; ++iteration) {
+    system_.residual(stage.t_s, x_, v_, a_, residual_);
+    correction_.noalias() = lu_.solve(residual_);
+    ++iterations_;
+    a_ -= correction_;
+    place(stage);
+    const double gamma = stage.gamma_s;
+    const double squares = gamma * gamma *
+                           (gamma * gamma * correction_.cwiseProduct(stage.weight_x).squaredNorm() +
+                            correction_.cwiseProduct(stage.weight_v).squaredNorm());
+    const double norm = std::sqrt(squares / stage.components);
+    if (!std::isfinite(norm)) {
+      return Outcome::failed;
+    }
+    if (iteration > 0) {
+      rate_seen_ = true;
+      rate_ = std::max(0.3 * rate_, previous > 0.0 ? norm / previous : 0.0);
+    }
+    if (norm * std::min(1.0, rate_) <= stage.tolerance) {
+      return Outcome::converged;
+    }
+    if (iteration > 0 && norm > 0.9 * previous) {
+      return Outcome::slow;
+    }
+    previous = norm;
+  }
+  return Outcome::slow;
+}
+
+bool StageSolver::solve(const Stage& stage) {
+  guess_ = a_;
+  place(stage);
+  const bool fresh = !linearized_ || age_ > kMaxAge;
+  if (fresh) {
+    linearize(stage);
+  } else if (std::abs(stage.gamma_s - gamma_s_) > 1e-3 * gamma_s_) {
+    factorize(stage.gamma_s);
+  }
+  ++age_;
+  Outcome outcome = iterate(stage);
+  if (outcome == Outcome::converged) {
+    // A matrix that has become this poor costs more iterations than a new one.
+    linearized_ = !(rate_seen_ && rate_ > 0.3 && age_ >= 8);
+    return true;
+  }
+  if (!fresh) {
+    a_ = guess_;
+    place(stage);
+    linearize(stage);
+    outcome = iterate(stage);
+  }
+  if (outcome != Outcome::converged) {
+    a_ = guess_;
+    linearized_ = false;
+    return false;
+  }
+  return true;
+}
+
+}  // namespace softarm

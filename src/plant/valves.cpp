@@ -1,0 +1,102 @@
+#include "softarm/plant/valves.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+namespace softarm {
+namespace {
+
+int checked_count(int chambers) {
+  if (chambers < 0) {
+    throw std::invalid_argument("valves: expected a count of chambers >= 0, got " +
+                                std::to_string(chambers));
+  }
+  return chambers;
+}
+
+}  // namespace
+
+Valves::Valves(const ValveSettings& settings, int chambers)
+    : lag_s_(settings.lag_s),
+      supply_bar_(settings.supply_pressure_bar),
+      pressure_bar_(Eigen::VectorXd::Zero(checked_count(chambers))),
+      command_bar_(Eigen::VectorXd::Zero(chambers)) {
+  if (!(lag_s_ >= 0.0) || !std::isfinite(lag_s_)) {
+    throw std::invalid_argument("valves.lag_s: expected a finite time >= 0, got " +
+                                std::to_string(lag_s_));
+  }
+  if (!(supply_bar_ >= 0.0) || !std::isfinite(supply_bar_)) {
+    throw std::invalid_argument(
+        "valves.supply_pressure_bar: expected a finite pressure >= 0, got " +
+        std::to_string(supply_bar_));
+  }
+}
+
+void Valves::command(std::span<const double> command_bar) noexcept {
+  const std::size_t count = std::min(command_bar.size(), static_cast<std::size_t>(size()));
+  for (std::size_t i = 0; i < count; ++i) {
+    // The comparison is written so that NaN ends up at zero, the safe side.
+    const double wanted = command_bar[i] > 0.0 ? command_bar[i] : 0.0;
+    command_bar_[static_cast<Eigen::Index>(i)] = std::min(wanted, supply_bar_);
+  }
+  if (lag_s_ == 0.0) {
+    pressure_bar_ = command_bar_;
+  }
+}
+
+void Valves::advance(double step_s) noexcept {
+  if (lag_s_ == 0.0) {
+    return;
+  }
+  // expm1 keeps the update exact for steps far below the lag.
+  pressure_bar_ += -std::expm1(-step_s / lag_s_) * (command_bar_ - pressure_bar_);
+}
+
+void Valves::reset(std::span<const double> pressure_bar) noexcept {
+  command(pressure_bar);
+  pressure_bar_ = command_bar_;
+}
+
+double Valves::remaining(double ahead_s) const noexcept {
+  return lag_s_ == 0.0 ? 0.0 : std::exp(-ahead_s / lag_s_);
+}
+
+CommandExpiry::CommandExpiry(int chambers)
+    : set_points_bar_(Eigen::VectorXd::Zero(checked_count(chambers))) {}
+
+CommandVerdict CommandExpiry::receive(const PressureCommand& command,
+                                      std::int64_t arrival_ns) noexcept {
+  update(arrival_ns);
+  if (command.shadow) {
+    return CommandVerdict::shadow;
+  }
+  const auto finite = [](double pressure) { return std::isfinite(pressure); };
+  if (command.validity_ns <= 0 || command.sequence < 0 ||
+      command.pressure_bar.size() != static_cast<std::size_t>(set_points_bar_.size()) ||
+      !std::all_of(command.pressure_bar.begin(), command.pressure_bar.end(), finite)) {
+    return CommandVerdict::malformed;
+  }
+  if (command.sequence <= sequence_) {
+    return CommandVerdict::older;
+  }
+  sequence_ = command.sequence;
+  // Saturating: a validity of "for ever" must not wrap around into the past.
+  expires_ns_ =
+      command.validity_ns < kNever - 1 - arrival_ns ? arrival_ns + command.validity_ns : kNever - 1;
+  std::copy(command.pressure_bar.begin(), command.pressure_bar.end(), set_points_bar_.data());
+  return CommandVerdict::in_force;
+}
+
+bool CommandExpiry::update(std::int64_t now_ns) noexcept {
+  if (now_ns < expires_ns_ || vented()) {
+    return false;
+  }
+  expires_ns_ = kNever;
+  sequence_ = kNoSequence;
+  set_points_bar_.setZero();
+  return true;
+}
+
+}  // namespace softarm
