@@ -68,6 +68,36 @@ inline Vector3 acceleration(const FrameMotion& m, double spin_ab, const Curve& f
   return result;
 }
 
+/// Distributed mass: what the arc's motion about its base adds to moment and torque.
+template <bool kInertia, bool kCoriolis>
+inline void add_arc_forces(const SegmentParameters& segment, const std::array<double, 12>& c,
+                           const FrameMotion& m, double spin_ab,
+                           const Along<kInertia, kCoriolis>& along, SegmentForces& out) noexcept {
+  const double ux = out.ux, uy = out.uy, s = ux * ux + uy * uy;
+  const double scale = segment.mass_kg * segment.length_m * segment.length_m;
+  const ArcMoments moments = arc_moments(scale, s, c);
+  const Direction &a = along.a, &b = along.b, &x = along.x;
+  const double beta = a.x * b.x + a.y * b.y + x.along;
+  const ArcMotion motion{x.x,
+                         x.y,
+                         b.along * a.x + a.along * b.x + beta * ux,
+                         b.along * a.y + a.along * b.y + beta * uy,
+                         beta,
+                         a.along * b.along,
+                         x.along};
+  const auto add = [&out](const ArcForces& f) {
+    out.moment += f.moment;
+    out.torque += f.torque;
+  };
+  add(relative_motion_forces(moments, ux, uy, s, motion));
+  add(angular_forces(moments, ux, uy, s, m.angular));
+  if constexpr (kCoriolis) {
+    add(centripetal_forces(moments, ux, uy, s, m.spin_a, m.spin_b, spin_ab));
+    add(coriolis_forces(moments, ux, uy, s, m.spin_a, b));
+    add(coriolis_forces(moments, ux, uy, s, m.spin_b, a));
+  }
+}
+
 template <MassModel kMass, bool kInertia, bool kCoriolis>
 inline void own_forces(const SegmentParameters& segment, const auto& c, const FrameMotion& m,
                        double spin_ab, const Along<kInertia, kCoriolis>& along,
@@ -85,6 +115,7 @@ inline void own_forces(const SegmentParameters& segment, const auto& c, const Fr
     const Vector3 uniform = mass * m.linear;
     out.moment = cross(r, uniform);
     out.torque = project(centre, ux, uy, uniform);
+    add_arc_forces(segment, c, m, spin_ab, along, out);
   }
 }
 

@@ -1,0 +1,115 @@
+#include "model/arc_moments.hpp"
+
+#include <cmath>
+
+namespace softarm {
+namespace {
+
+/// d_k = c_k(4s) from c_j(s): integrate the addition theorem of cos k times,
+/// 2^k d_k = c0 c_k + c1 c_{k-1} + sum_{j=0}^{k-2} c_{k-j} / j!. All terms are positive for theta <
+/// pi/2.
+template <int K>
+double doubled(const std::array<double, 12>& c) noexcept {
+  constexpr auto k = static_cast<std::size_t>(K);
+  double sum = c[0] * c[k] + c[1] * c[k - 1];
+#pragma GCC unroll 16
+  for (std::size_t j = 0; j < k - 1; ++j) sum += c[k - j] * detail::kInverseFactorial[j];
+  return sum * (1.0 / static_cast<double>(1 << K));
+}
+
+/// Below the limit. Each coefficient set is the only combination of c_k(4s) and c_k(s), k = 3 ...
+/// 11, whose power series in s is that of the integral: products of sines and cosines of x theta
+/// become those of 2 x theta, and the polynomials in x in front are what raises k.
+ArcMoments from_entire(double scale, const std::array<double, 12>& c) noexcept {
+  const double d3 = doubled<3>(c), d4 = doubled<4>(c), d5 = doubled<5>(c), d6 = doubled<6>(c),
+               d7 = doubled<7>(c), d8 = doubled<8>(c), d9 = doubled<9>(c), d10 = doubled<10>(c),
+               d11 = doubled<11>(c);
+  ArcMoments m;
+  m.pp = scale * (8.0 * d5 - 2.0 * c[5]);
+  m.pq = scale * (4.0 * d4 - c[4]);
+  m.qq = scale * (2.0 * d3);
+  m.pp1 = scale * (80.0 * d7 - 16.0 * d6 + c[6] - 5.0 * c[7]);
+  m.pq1 = scale * (24.0 * d6 - 8.0 * d5 + c[5] - 2.0 * c[6]);
+  m.qp1 = scale * (40.0 * d6 - 8.0 * d5 - 2.0 * c[6]);
+  m.qq1 = scale * (12.0 * d5 - 4.0 * d4);
+  m.pp2 = scale * (1408.0 * d9 - 384.0 * d8 + 32.0 * d7 - c[7] + 7.0 * c[8] - 23.0 * c[9]);
+  m.pq2 = scale * (320.0 * d8 - 128.0 * d7 + 16.0 * d6 - c[6] + 5.0 * c[7] - 8.0 * c[8]);
+  m.qp2 = scale * (704.0 * d8 - 192.0 * d7 + 16.0 * d6 - 8.0 * c[8]);
+  m.qq2 = scale * (160.0 * d7 - 64.0 * d6 + 8.0 * d5);
+  m.p1p1 = scale * (832.0 * d9 - 320.0 * d8 + 32.0 * d7 + 4.0 * c[8] - 12.0 * c[9]);
+  m.q1q1 = scale * (80.0 * d7 - 48.0 * d6 + 8.0 * d5);
+  m.p1p2 = scale * (14976.0 * d11 - 6784.0 * d10 + 1088.0 * d9 - 64.0 * d8 - 2.0 * c[9] +
+                    22.0 * c[10] - 54.0 * c[11]);
+  m.q1q2 = scale * (1120.0 * d9 - 736.0 * d8 + 176.0 * d7 - 16.0 * d6);
+  return m;
+}
+
+/// Integrals of y^k cos(w y) and y^k sin(w y) over [0, theta], k = 0 ... 3, by parts.
+struct TrigonometricMoments {
+  double cosine[4], sine[4];
+
+  TrigonometricMoments(double w, double theta, double sin_end, double cos_end,
+                       double one_minus_cos_end) noexcept {
+    const double inverse = 1.0 / w;
+    cosine[0] = sin_end * inverse;
+    sine[0] = one_minus_cos_end * inverse;
+    double power = theta;
+    for (int k = 1; k < 4; ++k) {
+      sine[k] = (k * cosine[k - 1] - power * cos_end) * inverse;
+      cosine[k] = (power * sin_end - k * sine[k - 1]) * inverse;
+      power *= theta;
+    }
+  }
+};
+
+/// Above the limit, with y = x theta, S = sin y, C = cos y, V = 1 - C:
+/// P = V / theta^2, P1 = (y S - 2 V) / theta^4, P2 = (y^2 C - 5 y S + 8 V) / theta^6,
+/// Q = S / theta,   Q1 = (y C - S) / theta^3,   Q2 = (3 S - 3 y C - y^2 S) / theta^5.
+ArcMoments from_trigonometry(double scale, double s, double c0, double c1) noexcept {
+  const double theta = std::sqrt(s);
+  const double sine = c1 * theta;
+  const TrigonometricMoments once(1.0, theta, sine, c0, 1.0 - c0);
+  const TrigonometricMoments twice(2.0, theta, 2.0 * sine * c0, 1.0 - 2.0 * sine * sine,
+                                   2.0 * sine * sine);
+  double SS[4], SC[4], CC[4], VS[4], VC[4];  // integrals of y^k times the product
+  double power = theta;
+  for (int k = 0; k < 4; ++k) {
+    const double one = power / (k + 1);
+    SS[k] = 0.5 * (one - twice.cosine[k]);
+    CC[k] = 0.5 * (one + twice.cosine[k]);
+    SC[k] = 0.5 * twice.sine[k];
+    VS[k] = once.sine[k] - SC[k];
+    VC[k] = once.cosine[k] - CC[k];
+    power *= theta;
+  }
+  const double VV = theta - 2.0 * once.cosine[0] + CC[0];
+  const double i1 = 1.0 / theta, i2 = i1 * i1;
+  const double w3 = scale * i1 * i2, w4 = w3 * i1, w5 = w3 * i2, w6 = w5 * i1, w7 = w5 * i2;
+  ArcMoments m;
+  m.pp = w5 * VV;
+  m.pq = w4 * VS[0];
+  m.qq = w3 * SS[0];
+  m.pp1 = w7 * (VS[1] - 2.0 * VV);
+  m.pq1 = w6 * (VC[1] - VS[0]);
+  m.qp1 = w6 * (SS[1] - 2.0 * VS[0]);
+  m.qq1 = w5 * (SC[1] - SS[0]);
+  m.pp2 = w7 * i2 * (VC[2] - 5.0 * VS[1] + 8.0 * VV);
+  m.pq2 = w7 * i1 * (3.0 * VS[0] - 3.0 * VC[1] - VS[2]);
+  m.qp2 = w7 * i1 * (SC[2] - 5.0 * SS[1] + 8.0 * VS[0]);
+  m.qq2 = w7 * (3.0 * SS[0] - 3.0 * SC[1] - SS[2]);
+  m.p1p1 = w7 * i2 * (SS[2] - 4.0 * VS[1] + 4.0 * VV);
+  m.q1q1 = w7 * (CC[2] - 2.0 * SC[1] + SS[0]);
+  m.p1p2 = w7 * i2 * i2 * (SC[3] - 5.0 * SS[2] + 18.0 * VS[1] - 2.0 * VC[2] - 16.0 * VV);
+  m.q1q2 = w7 * i2 * (SS[2] - SC[3] - 3.0 * CC[2] + 6.0 * SC[1] - 3.0 * SS[0]);
+  return m;
+}
+
+}  // namespace
+
+ArcMoments arc_moments(double mass_length_squared, double s,
+                       const std::array<double, 12>& c) noexcept {
+  if (s < kArcSeriesLimit) return from_entire(mass_length_squared, c);
+  return from_trigonometry(mass_length_squared, s, c[0], c[1]);
+}
+
+}  // namespace softarm
