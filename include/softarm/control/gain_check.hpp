@@ -9,17 +9,17 @@
 
 namespace softarm {
 
-/// Largest factor on the gains K_P, K_D (2n each, diagonal, in u) with which the loop linearized
-/// about the straight pose at rest is stable; 0 if it is unstable without them, capped at 1e3. Not
-/// for the loop: allocates.
+/// Largest factor on the gains K_P, K_D with which the loop, linearized about the straight pose at
+/// rest, is stable; 0 if it is unstable without them, at most 1e3. kp_u (N m/rad), kd_u (N m
+/// s/rad): diagonals in u, 2n each. Not for the loop: allocates, solves eigenvalue problems of 6n
+/// states.
 ///
 /// The linearized loop of one bending plane is
-///   B s^2 + (beta I) s + k I + G_u + H(s) (K_P + K_D s - G_u),   H(s) = e^(-s T) / (tau_v s + 1),
-/// with T = delay_s + half of what the caller adds for sampling, tau_v = valve_lag_s, G_u the slope
-/// of gravity (the controller feeds G back late). H is taken with a Pade approximation of order
-/// (3,3), exact to 1e-3 rad of phase up to w T = 2.5; stability is read from the eigenvalues. Away
-/// from the straight pose B and G_u differ; take it as a guide with a margin, not as a proof. The
-/// velocity filter is left out.
+///   B s^2 + beta s + k + G_u + H(s) (K_P + K_D s - G_u),   H(s) = e^(-s T) / (tau_v s + 1),
+/// T = delay_s, tau_v = valve_lag_s, G_u the slope of gravity (the controller feeds G back late).
+/// What is approximate: the delay is a Pade approximant of order (3,3) (phase exact to 2e-3 rad up
+/// to w T = 2); B and G_u are those of the straight pose, planes do not couple; sampling and the
+/// velocity filter are not in it unless delay_s counts them. A guide with a margin, not a proof.
 double largest_gain_factor(const ArmParameters& arm, const ControllerSettings& settings,
                            const Eigen::VectorXd& kp_u, const Eigen::VectorXd& kd_u);
 

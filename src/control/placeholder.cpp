@@ -1,1 +1,0 @@
-#include "softarm/control/settings.hpp"

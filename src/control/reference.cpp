@@ -1,0 +1,323 @@
+#include "softarm/control/reference.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "control/blend.hpp"
+#include "control/reference_curves.hpp"
+
+namespace softarm {
+namespace {
+
+constexpr double kQuinticPeakSpeed = 1.875;
+constexpr double kKnee = 0.98;          ///< of max_theta_rad: from here on theta is bent
+constexpr double kShortestLive = 0.05;  ///< s, for a live reference that is corrected a little
+
+double largest_norm(const SegmentVector& v) noexcept {
+  double largest = 0.0;
+  for (Eigen::Index i = 0; i < v.size(); i += 2) {
+    largest = std::max(largest, std::hypot(v[i], v[i + 1]));
+  }
+  return largest;
+}
+
+void resize(ReferenceSample& sample, int dof) noexcept {
+  sample.u.resize(dof);
+  sample.velocity.resize(dof);
+  sample.acceleration.resize(dof);
+  sample.has_polar = false;
+  sample.limited = false;
+}
+
+/// Bends u inside of theta < limit: theta -> knee + w tanh((theta - knee) / w), w = limit - knee;
+/// C2, exact chain rule.
+bool bend_inside(double limit, ReferenceSample& sample) noexcept {
+  const double knee = kKnee * limit, w = limit - knee;
+  bool bent = false;
+  for (Eigen::Index i = 0; i < sample.u.size(); i += 2) {
+    auto u = sample.u.segment<2>(i), ud = sample.velocity.segment<2>(i),
+         udd = sample.acceleration.segment<2>(i);
+    const double r = u.norm();
+    if (r <= knee) continue;
+    bent = true;
+    const Eigen::Vector2d n = u / r;
+    const double rd = n.dot(ud), rdd = (ud.squaredNorm() + u.dot(udd) - rd * rd) / r;
+    const Eigen::Vector2d nd = (ud - rd * n) / r, ndd = (udd - rdd * n - 2.0 * rd * nd) / r;
+    const double s = std::tanh((r - knee) / w), slope = 1.0 - s * s;
+    const double bent_r = knee + w * s, bent_rd = slope * rd;
+    const double bent_rdd = slope * rdd - 2.0 * s * slope / w * rd * rd;
+    u = bent_r * n;
+    ud = bent_rd * n + bent_r * nd;
+    udd = bent_rdd * n + 2.0 * bent_rd * nd + bent_r * ndd;
+  }
+  return bent;
+}
+
+}  // namespace
+
+struct Reference::State {
+  /// The latest message of a live phase; its times count from the beginning of the phase.
+  struct Message {
+    bool received = false;
+    double time_s = 0.0;
+    SegmentVector u, velocity, acceleration;
+    Blend rest;  ///< back to u once messages stop
+  };
+  struct Phase {
+    ReferenceKind kind;
+    double begin_s = 0.0;
+    double peak_speed_radps = 0.0;
+    Blend join;
+    Message message;
+  };
+
+  int dof = 0;
+  ControllerSettings control;
+  std::vector<Phase> phases;
+  bool started = false;
+  double start_s = 0.0;
+  ReferenceSample from, to;  ///< scratch
+  SegmentVector offset, offset_rate, zero;
+
+  const Phase& at(double time_s, int& index) const noexcept;
+  void curve(const Phase& phase, double time_s, ReferenceSample& out) const noexcept;
+  void unlimited(int index, double time_s, ReferenceSample& out) const noexcept;
+  double blend_duration(const SegmentVector& d, double peak_speed_radps) const noexcept;
+  void join(int index) noexcept;
+  void join_message(Phase& phase, double time_s) noexcept;
+};
+
+const Reference::State::Phase& Reference::State::at(double time_s, int& index) const noexcept {
+  index = static_cast<int>(phases.size()) - 1;
+  while (index > 0 && time_s < phases[static_cast<std::size_t>(index)].begin_s) --index;
+  return phases[static_cast<std::size_t>(index)];
+}
+
+// The phase's own curve at a time since its beginning.
+void Reference::State::curve(const Phase& phase, double time_s,
+                             ReferenceSample& out) const noexcept {
+  resize(out, dof);
+  const auto* live = std::get_if<LiveReference>(&phase.kind);
+  if (live == nullptr) {
+    std::visit(
+        [&](const auto& kind) {
+          if constexpr (!std::is_same_v<std::decay_t<decltype(kind)>, LiveReference>) {
+            evaluate(kind, time_s, out);
+          }
+        },
+        phase.kind);
+    return;
+  }
+  const Message& message = phase.message;
+  const double age = std::max(time_s - message.time_s, 0.0);
+  out.u = message.u;
+  out.velocity.setZero();
+  out.acceleration.setZero();
+  if (!message.received) return;
+  if (age < live->timeout_s) {
+    out.u += age * message.velocity + 0.5 * age * age * message.acceleration;
+    out.velocity = message.velocity + age * message.acceleration;
+    out.acceleration = message.acceleration;
+  } else {
+    message.rest.add(time_s, out);
+  }
+}
+
+void Reference::State::unlimited(int index, double time_s, ReferenceSample& out) const noexcept {
+  const Phase& phase = phases[static_cast<std::size_t>(index)];
+  const double local = time_s - phase.begin_s;
+  curve(phase, local, out);
+  if (phase.join.active(local)) {
+    phase.join.add(local, out);
+    out.has_polar = false;
+  }
+}
+
+double Reference::State::blend_duration(const SegmentVector& d, double peak) const noexcept {
+  const double speed = std::max(control.max_speed_radps - peak, 0.25 * control.max_speed_radps);
+  return std::max({control.blend_s, kQuinticPeakSpeed * largest_norm(d) / speed, 1e-3});
+}
+
+// Joins phase `index` to `from` (u, velocity), what the reference is just before it.
+void Reference::State::join(int index) noexcept {
+  Phase& phase = phases[static_cast<std::size_t>(index)];
+  if (std::holds_alternative<LiveReference>(phase.kind)) {
+    phase.message.received = false;
+    phase.message.u = from.u;
+    phase.message.time_s = 0.0;
+  }
+  phase.join.clear();
+  curve(phase, 0.0, to);
+  offset = from.u - to.u;
+  offset_rate = from.velocity - to.velocity;
+  phase.join.set(0.0, blend_duration(offset, phase.peak_speed_radps), offset, offset_rate, zero);
+}
+
+// The message in `to` (u, velocity, acceleration) takes over from the curve in `from`. What the
+// earlier blend still has to do goes on as it would have; what the message adds takes the time that
+// keeps accelerations those of a full step in blend_s.
+void Reference::State::join_message(Phase& phase, double time_s) noexcept {
+  offset = from.u - to.u;
+  offset_rate = from.velocity - to.velocity;
+  const double acceleration =
+      control.max_step_rad / std::max(control.blend_s * control.blend_s, 1e-6);
+  double duration =
+      std::max({phase.join.remaining_s(time_s), kShortestLive,
+                std::sqrt(largest_norm(offset) / acceleration),
+                std::min(largest_norm(offset_rate) / acceleration, control.blend_s),
+                kQuinticPeakSpeed * largest_norm(offset) / (0.5 * control.max_speed_radps)});
+  from.u = offset;
+  from.velocity = offset_rate;
+  from.acceleration -= to.acceleration;
+  phase.join.add(time_s, from);
+  phase.join.set(time_s, duration, from.u, from.velocity, from.acceleration);
+
+  Message& message = phase.message;
+  message.received = true;
+  message.time_s = time_s;
+  message.u = to.u;
+  message.velocity = to.velocity;
+  message.acceleration = to.acceleration;
+  const double timeout = std::get<LiveReference>(phase.kind).timeout_s;
+  offset = timeout * to.velocity + 0.5 * timeout * timeout * to.acceleration;
+  offset_rate = to.velocity + timeout * to.acceleration;
+  message.rest.set(time_s + timeout, blend_duration(offset, 0.0), offset, offset_rate,
+                   to.acceleration);
+}
+
+Reference::Reference(const ReferenceSettings& settings, const ControllerSettings& control,
+                     int segments)
+    : state_(std::make_unique<State>()) {
+  if (segments < 1 || segments > kMaxSegments) {
+    throw std::invalid_argument(
+        fmt::format("reference: expected 1 to {} segments, got {}", kMaxSegments, segments));
+  }
+  if (settings.phases.empty()) {
+    throw std::invalid_argument("reference: expected at least one phase, got none");
+  }
+  if (!(control.max_theta_rad > 0.0) || !(control.max_speed_radps > 0.0) ||
+      !(control.max_step_rad > 0.0) || !(control.blend_s >= 0.0)) {
+    throw std::invalid_argument(fmt::format(
+        "reference: expected max_theta_rad, max_speed_radps, max_step_rad > 0 and blend_s >= 0, "
+        "got {}, {}, {} and {}",
+        control.max_theta_rad, control.max_speed_radps, control.max_step_rad, control.blend_s));
+  }
+  state_->dof = 2 * segments;
+  state_->control = control;
+  double begin = 0.0;
+  for (std::size_t i = 0; i < settings.phases.size(); ++i) {
+    const ReferencePhase& phase = settings.phases[i];
+    const std::string where = fmt::format("reference, phase {}", i + 1);
+    check_phase(where, phase.kind, control, segments);
+    const bool last = i + 1 == settings.phases.size();
+    if (!last && !(std::isfinite(phase.duration_s) && phase.duration_s > 0.0)) {
+      throw std::invalid_argument(
+          fmt::format("{}: expected a duration (s) > 0, got {}", where, phase.duration_s));
+    }
+    State::Phase made;
+    made.kind = phase.kind;
+    made.begin_s = begin;
+    made.peak_speed_radps = largest_speed_radps(phase.kind);
+    made.join.resize(state_->dof);
+    made.message.u.setZero(state_->dof);
+    made.message.velocity.setZero(state_->dof);
+    made.message.acceleration.setZero(state_->dof);
+    made.message.rest.resize(state_->dof);
+    state_->phases.push_back(std::move(made));
+    begin += phase.duration_s;
+  }
+  state_->zero.setZero(state_->dof);
+  state_->offset.setZero(state_->dof);
+  state_->offset_rate.setZero(state_->dof);
+  resize(state_->from, state_->dof);
+  resize(state_->to, state_->dof);
+}
+
+Reference::~Reference() = default;
+Reference::Reference(Reference&&) noexcept = default;
+Reference& Reference::operator=(Reference&&) noexcept = default;
+
+bool Reference::started() const noexcept { return state_->started; }
+
+void Reference::start(double time_s, ConstVectorRef u, ConstVectorRef velocity) noexcept {
+  State& s = *state_;
+  s.started = true;
+  s.start_s = time_s;
+  s.from.u = u;
+  s.from.velocity = velocity;
+  for (int i = 0; i < static_cast<int>(s.phases.size()); ++i) {
+    if (i > 0) s.unlimited(i - 1, s.phases[static_cast<std::size_t>(i)].begin_s, s.from);
+    s.join(i);
+  }
+}
+
+void Reference::sample(double time_s, ReferenceSample& out) const noexcept {
+  const State& s = *state_;
+  const double time = std::max(time_s - s.start_s, 0.0);
+  int index;
+  s.at(time, index);
+  s.unlimited(index, time, out);
+  if (bend_inside(s.control.max_theta_rad, out)) {
+    out.limited = true;
+    out.has_polar = false;
+  }
+  if (largest_norm(out.velocity) > s.control.max_speed_radps * (1.0 + 1e-9)) out.limited = true;
+}
+
+void Reference::window(double time_s, double lookahead_s, ReferenceWindow& out) const noexcept {
+  sample(time_s, out.now);
+  out.interval_s = 0.0;
+  if (!(lookahead_s > 0.0)) return;
+  // Neither over the start nor over the latest message: what was before belongs to another curve.
+  const State& s = *state_;
+  int index;
+  const State::Phase& phase = s.at(std::max(time_s - s.start_s, 0.0), index);
+  double earliest = s.start_s;
+  if (phase.message.received) earliest += phase.begin_s + phase.message.time_s;
+  const double before = std::max(time_s - lookahead_s, std::min(earliest, time_s));
+  sample(before, out.before);
+  sample(time_s + lookahead_s, out.after);
+  out.interval_s = time_s + lookahead_s - before;
+}
+
+LiveVerdict Reference::receive(double time_s, ConstVectorRef u, ConstVectorRef velocity,
+                               ConstVectorRef acceleration) noexcept {
+  State& s = *state_;
+  const double time = time_s - s.start_s;
+  int index;
+  s.at(time, index);
+  State::Phase& phase = s.phases[static_cast<std::size_t>(index)];
+  const auto* live = std::get_if<LiveReference>(&phase.kind);
+  if (!s.started || time < 0.0 || live == nullptr) return LiveVerdict::not_live;
+  if (u.size() != s.dof || velocity.size() != s.dof || acceleration.size() != s.dof) {
+    return LiveVerdict::wrong_size;
+  }
+  if (!u.allFinite() || !velocity.allFinite() || !acceleration.allFinite()) {
+    return LiveVerdict::not_finite;
+  }
+  resize(s.to, s.dof);
+  s.to.u = u;
+  s.to.velocity = velocity;
+  s.to.acceleration = acceleration;
+  s.offset_rate = velocity + live->timeout_s * acceleration;
+  const double max_speed = s.control.max_speed_radps;
+  if (largest_norm(s.to.u) > s.control.max_theta_rad || largest_norm(s.to.velocity) > max_speed ||
+      largest_norm(s.offset_rate) > max_speed) {
+    return LiveVerdict::out_of_limits;
+  }
+  const double local = time - phase.begin_s;
+  s.curve(phase, local, s.from);
+  s.offset = s.from.u - s.to.u;
+  if (largest_norm(s.offset) > s.control.max_step_rad) return LiveVerdict::step_too_large;
+  s.join_message(phase, local);
+  for (int i = index + 1; i < static_cast<int>(s.phases.size()); ++i) {
+    s.unlimited(i - 1, s.phases[static_cast<std::size_t>(i)].begin_s, s.from);
+    s.join(i);
+  }
+  return LiveVerdict::accepted;
+}
+
+}  // namespace softarm

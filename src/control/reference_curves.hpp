@@ -1,0 +1,23 @@
+// The curves that are known beforehand: set point, (24), way points. Times count from the beginning
+// of the phase.
+#pragma once
+
+#include "softarm/control/reference.hpp"
+
+namespace softarm {
+
+/// All three vectors of `out` must have their size; has_polar is set for (24).
+void evaluate(const SetPointReference& curve, double time_s, ReferenceSample& out) noexcept;
+void evaluate(const PaperReference& curve, double time_s, ReferenceSample& out) noexcept;
+void evaluate(const WayPointReference& curve, double time_s, ReferenceSample& out) noexcept;
+
+/// Largest theta (rad) and a bound on the largest |u'| of a segment (rad/s).
+double largest_theta_rad(const ReferenceKind& kind) noexcept;
+double largest_speed_radps(const ReferenceKind& kind) noexcept;
+
+/// Throws std::invalid_argument, starting with `where`, if the phase does not fit the arm or the
+/// limits.
+void check_phase(const std::string& where, const ReferenceKind& kind,
+                 const ControllerSettings& control, int segments);
+
+}  // namespace softarm
