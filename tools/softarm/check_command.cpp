@@ -13,7 +13,11 @@ void add_check_command(CLI::App& app) {
   auto* command = app.add_subcommand("check", "Check a configuration");
   auto file = std::make_shared<std::string>();
   command->add_option("CONFIG", *file, "the experiment, a YAML file")->required();
-  command->callback([file] { load_experiment(*file); });
+  command->callback([file] {
+    const Experiment experiment = load_experiment(*file);
+    fmt::print("# {}, configuration {}\n{}", *file, hash_text(experiment.hash),
+               resolved_text(experiment));
+  });
 }
 
 }  // namespace softarm

@@ -17,23 +17,7 @@ class ConfigError : public std::runtime_error {
   std::string got;
 
   ConfigError(std::string file_name, int line_number, std::string key_path,
-              std::string expected_text, std::string got_text)
-      : std::runtime_error(message(file_name, line_number, key_path, expected_text, got_text)),
-        file(std::move(file_name)),
-        line(line_number),
-        key(std::move(key_path)),
-        expected(std::move(expected_text)),
-        got(std::move(got_text)) {}
-
- private:
-  static std::string message(const std::string& file, int line, const std::string& key,
-                             const std::string& expected, const std::string& got) {
-    std::string text = file;
-    if (line > 0) text += ":" + std::to_string(line);
-    text += ": ";
-    if (!key.empty()) text += key + ": ";
-    return text + "expected " + expected + ", got " + got;
-  }
+              std::string expected_text, std::string got_text);
 };
 
 }  // namespace softarm

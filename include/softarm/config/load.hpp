@@ -1,6 +1,7 @@
 // From a YAML file to a checked experiment, and back to text.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -10,9 +11,16 @@
 
 namespace softarm {
 
-/// Reads and checks an experiment. Every value of the result is finite, in range and consistent
-/// with the others.
+/// Reads and checks an experiment, with the files it includes. Every value of the result is finite,
+/// in its range and consistent with the others.
 /// @throws ConfigError and nothing else.
 Experiment load_experiment(const std::filesystem::path& file);
+
+/// The whole configuration as YAML, every default written out, units in comments. Loads again to
+/// the same experiment.
+std::string resolved_text(const Experiment& experiment);
+
+/// Sixteen hexadecimal digits, as logs and the status message show Experiment::hash.
+std::string hash_text(std::uint64_t hash);
 
 }  // namespace softarm

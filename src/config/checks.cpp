@@ -1,0 +1,188 @@
+#include "config/checks.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <cstring>
+#include <set>
+
+namespace softarm {
+namespace {
+
+/// A stop vents within this time, whatever the pressures were.
+constexpr double kLongestVent_s = 1.0;
+constexpr double kRotationTolerance = 1e-6;
+
+class Checks {
+ public:
+  Checks(const Experiment& experiment, const ExperimentReader& reader)
+      : experiment_(experiment), reader_(reader) {}
+
+  void run() const {
+    check_arm("arm", experiment_.arm);
+    check_arm("plant.arm", experiment_.plant.arm);
+    check_actuation("actuation", experiment_.actuation);
+    check_actuation("plant.actuation", experiment_.plant.actuation);
+    check_same_chambers();
+    check_reference();
+    check_bodies();
+    check_safety();
+    check_lcm();
+  }
+
+ private:
+  void require(bool holds, const std::string& key, const std::string& expected,
+               const std::string& got) const {
+    if (!holds) throw reader_.error_at(key, expected, got);
+  }
+
+  void check_arm(const std::string& key, const ArmParameters& arm) const {
+    const Eigen::Matrix3d& r = arm.base_rotation;
+    const double deviation =
+        (r.transpose() * r - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
+    const double determinant = r.determinant();
+    require(
+        deviation < kRotationTolerance && determinant > 0.0, key + ".base.rotation",
+        "a rotation: orthonormal, determinant +1",
+        fmt::format("R'R off the identity by {:.2g}, determinant {:.6g}", deviation, determinant));
+  }
+
+  void check_actuation(const std::string& key, const ActuationSettings& actuation) const {
+    const double low = actuation.min_pressure_bar;
+    const double high = actuation.max_pressure_bar;
+    const double bias = actuation.bias_pressure_bar;
+    require(low < high, key + ".max_pressure_bar",
+            fmt::format("more than min_pressure_bar ({} bar)", low), fmt::format("{} bar", high));
+    require(low <= bias && bias <= high, key + ".bias_pressure_bar",
+            fmt::format("between min and max_pressure_bar ([{}, {}] bar)", low, high),
+            fmt::format("{} bar", bias));
+    const double vent_s = std::max(high, -low) / actuation.vent_bar_per_s;
+    require(vent_s < kLongestVent_s, key + ".vent_bar_per_s",
+            fmt::format("more than {} bar/s, so that venting takes less than {} s",
+                        std::max(high, -low) / kLongestVent_s, kLongestVent_s),
+            fmt::format("{} bar/s", actuation.vent_bar_per_s));
+    const std::size_t fewest = actuation.plane_rad ? 2 : 3;
+    for (const auto& chambers : actuation.segments) {
+      require(chambers.size() >= fewest, key + ".chambers",
+              fmt::format("at least {} chambers a segment{}", fewest,
+                          actuation.plane_rad ? " of a planar arm"
+                                              : " (2 for a planar arm with plane_rad)"),
+              fmt::format("{}", chambers.size()));
+    }
+  }
+
+  void check_same_chambers() const {
+    for (std::size_t i = 0; i < experiment_.actuation.segments.size(); ++i) {
+      const auto commanded = experiment_.actuation.segments[i].size();
+      const auto there = experiment_.plant.actuation.segments[i].size();
+      require(commanded == there, "plant.actuation.chambers",
+              fmt::format("as many chambers as actuation.chambers ({}) in segment {}", commanded,
+                          i + 1),
+              fmt::format("{}", there));
+    }
+  }
+
+  void check_pose(const std::string& key, const std::vector<double>& u) const {
+    for (std::size_t i = 0; i + 1 < u.size(); i += 2) {
+      const double theta = std::hypot(u[i], u[i + 1]);
+      require(theta <= experiment_.control.max_theta_rad, key,
+              fmt::format("theta within control.max_theta_rad ({} rad)",
+                          experiment_.control.max_theta_rad),
+              fmt::format("{:.6g} rad in segment {}", theta, i / 2 + 1));
+    }
+  }
+
+  void check_reference() const {
+    const auto& phases = experiment_.reference.phases;
+    for (std::size_t i = 0; i < phases.size(); ++i) {
+      const std::string key = fmt::format("reference[{}]", i);
+      if (const auto* hold = std::get_if<SetPointReference>(&phases[i].kind)) {
+        check_pose(key, hold->u_rad);
+      } else if (const auto* paper = std::get_if<PaperReference>(&phases[i].kind)) {
+        check_pose(key + ".theta_rad", {paper->theta_rad, 0.0});
+      } else if (const auto* way = std::get_if<WayPointReference>(&phases[i].kind)) {
+        check_way_points(key + ".points", *way);
+      }
+    }
+  }
+
+  void check_way_points(const std::string& key, const WayPointReference& way) const {
+    for (std::size_t j = 0; j < way.points.size(); ++j) {
+      const std::string at = fmt::format("{}[{}]", key, j);
+      check_pose(at, way.points[j].u_rad);
+      require(j == 0 || way.points[j].time_s > way.points[j - 1].time_s, at + ".time_s",
+              "later than the point before", fmt::format("{} s", way.points[j].time_s));
+    }
+    require(!way.repeat || way.points.size() >= 2, key, "at least 2 points to repeat",
+            fmt::format("{}", way.points.size()));
+  }
+
+  void check_bodies() const {
+    const BodySettings& bodies = experiment_.daemon.bodies;
+    std::set<int> seen;
+    for (const int id : bodies.segment_ids) {
+      require(seen.insert(id).second, "daemon.bodies.segment_ids", "every body once",
+              fmt::format("body {} twice", id));
+    }
+    require(bodies.base_id < 0 || seen.insert(bodies.base_id).second, "daemon.bodies.base_id",
+            "a body that is no segment's end", fmt::format("{}", bodies.base_id));
+  }
+
+  void check_safety() const {
+    const SafetySettings& safety = experiment_.daemon.safety;
+    require(safety.hold_after_s == 0.0 || safety.vent_after_s == 0.0 ||
+                safety.hold_after_s <= safety.vent_after_s,
+            "daemon.safety.vent_after_s",
+            fmt::format("at least hold_after_s ({} s)", safety.hold_after_s),
+            fmt::format("{} s", safety.vent_after_s));
+    require(safety.hold_overruns <= safety.vent_overruns, "daemon.safety.vent_overruns",
+            fmt::format("at least hold_overruns ({})", safety.hold_overruns),
+            fmt::format("{}", safety.vent_overruns));
+    require(safety.frame_latency_s <= safety.max_latency_s, "daemon.safety.max_latency_s",
+            fmt::format("at least frame_latency_s ({} s)", safety.frame_latency_s),
+            fmt::format("{} s", safety.max_latency_s));
+    const double period_s = 1.0 / experiment_.daemon.rate_hz;
+    require(experiment_.daemon.lcm.command_validity_s >= 2.0 * period_s,
+            "daemon.lcm.command_validity_s",
+            fmt::format("at least two ticks of daemon.rate_hz ({:.6g} s)", 2.0 * period_s),
+            fmt::format("{} s", experiment_.daemon.lcm.command_validity_s));
+  }
+
+  void check_lcm() const {
+    const LcmSettings& lcm = experiment_.daemon.lcm;
+    const std::pair<const char*, const std::string&> channels[] = {
+        {"mocap_channel", lcm.mocap_channel},
+        {"command_channel", lcm.command_channel},
+        {"measurement_channel", lcm.measurement_channel},
+        {"reference_channel", lcm.reference_channel},
+        {"operator_channel", lcm.operator_channel},
+        {"status_channel", lcm.status_channel},
+        {"timing_channel", lcm.timing_channel},
+        {"plant_channel", lcm.plant_channel}};
+    std::set<std::string> seen;
+    for (const auto& [key, name] : channels) {
+      const bool word = std::all_of(name.begin(), name.end(), [](char c) {
+        return std::isalnum(static_cast<unsigned char>(c)) || std::strchr("_-./", c) != nullptr;
+      });
+      require(word, fmt::format("daemon.lcm.{}", key), "letters, digits, _ - . /",
+              "\"" + name + "\"");
+      require(seen.insert(name).second, fmt::format("daemon.lcm.{}", key), "a channel of its own",
+              "\"" + name + "\", which another key names too");
+    }
+    require(lcm.url.find("://") != std::string::npos, "daemon.lcm.url",
+            "an LCM provider, such as udpm://239.255.76.67:7667?ttl=0", "\"" + lcm.url + "\"");
+  }
+
+  const Experiment& experiment_;
+  const ExperimentReader& reader_;
+};
+
+}  // namespace
+
+void check_consistency(const Experiment& experiment, const ExperimentReader& reader) {
+  Checks(experiment, reader).run();
+}
+
+}  // namespace softarm

@@ -1,0 +1,299 @@
+// The description of references, the daemon and the simulated arm.
+#include <array>
+#include <cmath>
+#include <numeric>
+
+#include "config/schema.hpp"
+
+namespace softarm {
+namespace {
+
+constexpr auto kRequired = Presence::required;
+constexpr double kTwoPi = 6.283185307179586;
+constexpr double kMany = 1e6;
+
+void describe_paper(SchemaVisitor& visitor, PaperReference& paper) {
+  visitor.number(
+      {"theta_rad", "rad", "theta of every segment after the rise", from_to(0.0, kTwoPi)},
+      paper.theta_rad);
+  visitor.number({"rise_s", "s", "time of the rise from theta = 0", above_to(0.0, 1e3)},
+                 paper.rise_s);
+  visitor.number({"phi_centre_rad", "rad", "phi_i = centre + amplitude cos(rate t + (i - 1) step)",
+                  from_to(-kTwoPi, kTwoPi)},
+                 paper.phi_centre_rad);
+  visitor.number({"phi_amplitude_rad", "rad", "amplitude of phi", from_to(0.0, 100.0)},
+                 paper.phi_amplitude_rad);
+  visitor.number({"rate_radps", "rad/s", "rate of phi", from_to(0.0, 1e3)}, paper.rate_radps);
+  visitor.number(
+      {"phase_step_rad", "rad", "phase from segment to segment", from_to(-kTwoPi, kTwoPi)},
+      paper.phase_step_rad);
+}
+
+void describe_way_points(SchemaVisitor& visitor, WayPointReference& reference, int segments) {
+  visitor.flag({"repeat", "", "start again after the last point"}, reference.repeat);
+  visitor.list(
+      {"points", "", "at rest in each, minimum jerk between them", {}, kRequired},
+      static_cast<int>(reference.points.size()),
+      [&](int size) { reference.points.resize(static_cast<std::size_t>(size)); },
+      [&](int i) {
+        WayPoint& point = reference.points[static_cast<std::size_t>(i)];
+        visitor.number({"time_s", "s", "since the start of the phase, increasing",
+                        from_to(0.0, kMany), kRequired},
+                       point.time_s);
+        describe_pose(visitor, point.u_rad, segments, kRequired);
+      });
+}
+
+void set_kind(ReferenceKind& kind, int index) {
+  if (static_cast<int>(kind.index()) == index) return;
+  if (index == 0) kind = SetPointReference{};
+  if (index == 1) kind = PaperReference{};
+  if (index == 2) kind = WayPointReference{};
+  if (index == 3) kind = LiveReference{};
+}
+
+void describe_phase(SchemaVisitor& visitor, ReferencePhase& phase, bool last, int segments) {
+  static const std::array<const char*, 4> kKinds = {"set_point", "paper", "way_points", "live"};
+  int index = static_cast<int>(phase.kind.index());
+  visitor.choice({"kind",
+                  "",
+                  "set_point: hold; paper: (24); way_points; live: what comes over LCM",
+                  {},
+                  kRequired},
+                 kKinds, index);
+  set_kind(phase.kind, index);
+  if (!last) {
+    visitor.number({"duration_s", "s", "of the phase; the last one lasts for ever and has none",
+                    above_to(0.0, kMany), kRequired},
+                   phase.duration_s);
+  }
+  if (auto* hold = std::get_if<SetPointReference>(&phase.kind)) {
+    describe_pose(visitor, hold->u_rad, segments, kRequired);
+  } else if (auto* paper = std::get_if<PaperReference>(&phase.kind)) {
+    describe_paper(visitor, *paper);
+  } else if (auto* way = std::get_if<WayPointReference>(&phase.kind)) {
+    describe_way_points(visitor, *way, segments);
+  } else if (auto* live = std::get_if<LiveReference>(&phase.kind)) {
+    visitor.number(
+        {"timeout_s", "s", "silence after which the last u is held at rest", above_to(0.0, 1e3)},
+        live->timeout_s);
+  }
+}
+
+void describe_safety(SchemaVisitor& visitor, SafetySettings& safety) {
+  static const std::array<const char*, 2> kArming = {"automatic", "explicit"};
+  visitor.choice({"arming", "", "automatic: ACTIVE on good frames; explicit: on an operator's arm"},
+                 kArming, safety.arming);
+  visitor.number({"frame_period_s", "s", "nominal, of the motion capture", above_to(0.0, 10.0)},
+                 safety.frame_period_s);
+  visitor.number({"frame_latency_s", "s", "declared, from capture to arrival", from_to(0.0, 10.0)},
+                 safety.frame_latency_s);
+  visitor.number({"hold_after_s", "s",
+                  "age of the last frame; 0: max(3 T, 3 frame periods + declared latency)",
+                  from_to(0.0, 100.0)},
+                 safety.hold_after_s);
+  visitor.number({"vent_after_s", "s", "age of the last frame; 0: max(100 ms, 10 frame periods)",
+                  from_to(0.0, 100.0)},
+                 safety.vent_after_s);
+  visitor.integer({"good_frames", "", "in a row, before HOLD or VENT is left", from_to(1, 100000)},
+                  safety.good_frames);
+  visitor.number({"max_latency_s", "s", "later frames count as stale", above_to(0.0, 10.0)},
+                 safety.max_latency_s);
+  visitor.integer({"frozen_frames", "",
+                   "identical poses in a row while the command changes: HOLD; 0: not checked",
+                   from_to(0, 1000000)},
+                  safety.frozen_frames);
+  visitor.integer({"hold_overruns", "", "missed ticks in a row, judged only with SCHED_FIFO",
+                   from_to(1, 1000000)},
+                  safety.hold_overruns);
+  visitor.integer({"vent_overruns", "", "the same", from_to(1, 1000000)}, safety.vent_overruns);
+  visitor.flag({"valve_readback", "", "valves publish pressures; 100 ms of silence is a fault"},
+               safety.valve_readback);
+}
+
+void describe_lcm(SchemaVisitor& visitor, LcmSettings& lcm) {
+  const auto channel = [&](const char* key, const char* doc, std::string& value) {
+    visitor.text({key, "", doc, from_to(1, 63)}, value);
+  };
+  visitor.text(
+      {"url", "", "LCM provider; the time to live keeps messages on this machine", from_to(1, 200)},
+      lcm.url);
+  channel("mocap_channel", "motion-capture frames", lcm.mocap_channel);
+  channel("command_channel", "pressure commands", lcm.command_channel);
+  channel("measurement_channel", "measured pressures", lcm.measurement_channel);
+  channel("reference_channel", "live references", lcm.reference_channel);
+  channel("operator_channel", "operator's commands", lcm.operator_channel);
+  channel("status_channel", "controller status", lcm.status_channel);
+  channel("timing_channel", "timing histograms", lcm.timing_channel);
+  channel("plant_channel", "a simulated arm's true state", lcm.plant_channel);
+  visitor.number({"command_validity_s", "s", "after which the valve side vents by itself",
+                  above_to(0.0, 10.0)},
+                 lcm.command_validity_s);
+}
+
+void describe_realtime(SchemaVisitor& visitor, RealtimeSettings& realtime) {
+  visitor.flag({"fifo", "", "SCHED_FIFO for the tick"}, realtime.fifo);
+  visitor.integer({"priority", "", "of SCHED_FIFO", from_to(1, 99)}, realtime.priority);
+  std::int64_t cpu = realtime.cpu;
+  visitor.integer_or_word({"cpu", "", "the tick's own CPU, or any", from_to(0, 1023)}, "any", cpu);
+  realtime.cpu = static_cast<int>(cpu);
+  visitor.flag({"lock_memory", "", "mlockall"}, realtime.lock_memory);
+}
+
+void describe_bodies(SchemaVisitor& visitor, BodySettings& bodies, int segments) {
+  std::int64_t base = bodies.base_id;
+  visitor.integer_or_word(
+      {"base_id", "", "body of the base, or fixed: arm.base holds", from_to(0, 2147483647.0)},
+      "fixed", base);
+  bodies.base_id = static_cast<int>(base);
+  if (bodies.segment_ids.empty()) {
+    bodies.segment_ids.resize(static_cast<std::size_t>(segments));
+    std::iota(bodies.segment_ids.begin(), bodies.segment_ids.end(), 1);
+  }
+  visitor.integers(
+      {"segment_ids", "", "bodies of the segments' ends, base to tip", from_to(0, 2147483647.0)},
+      segments, bodies.segment_ids);
+}
+
+/// Factors on what the controller believes, applied before absolute values override it.
+void describe_mismatch(SchemaVisitor& visitor, PlantSettings& plant) {
+  const int n = plant.arm.size();
+  const auto factor = [&](const char* key, const char* doc, const auto& apply) {
+    std::vector<double> values(static_cast<std::size_t>(n), 1.0);
+    visitor.numbers({key, "", doc, above_to(0.0, 100.0)}, {Shape::Kind::scalar_or_list, n}, values);
+    for (std::size_t i = 0; i < values.size(); ++i) apply(i, values[i]);
+  };
+  auto& segments = plant.arm.segments;
+  factor("stiffness_factor", "of all segments, or a list",
+         [&](std::size_t i, double f) { segments[i].stiffness_nm_per_rad *= f; });
+  factor("damping_factor", "the same",
+         [&](std::size_t i, double f) { segments[i].damping_nms_per_rad *= f; });
+  factor("mass_factor", "the same", [&](std::size_t i, double f) { segments[i].mass_kg *= f; });
+  factor("gain_factor", "of the chambers of all segments, or a list", [&](std::size_t i, double f) {
+    for (Chamber& chamber : plant.actuation.segments[i]) chamber.gain_nm_per_bar *= f;
+  });
+}
+
+void describe_mocap(SchemaVisitor& visitor, MocapSettings& mocap) {
+  visitor.number({"rate_hz", "Hz", "frames a second", above_to(0.0, 1e4)}, mocap.rate_hz);
+  visitor.number({"latency_s", "s", "from capture to arrival", from_to(0.0, 1.0)}, mocap.latency_s);
+  visitor.number(
+      {"position_noise_m", "m", "standard deviation an axis of every body", from_to(0.0, 1.0)},
+      mocap.position_noise_m);
+  visitor.number(
+      {"orientation_noise_rad", "rad",
+       "standard deviation of the rotation vector an axis of every body", from_to(0.0, 1.0)},
+      mocap.orientation_noise_rad);
+  visitor.number({"dropout_probability", "", "of a whole frame, independent from frame to frame",
+                  from_to(0.0, 1.0)},
+                 mocap.dropout_probability);
+  visitor.flag({"noise_on_base", "", "the base is measured with noise too"}, mocap.noise_on_base);
+}
+
+}  // namespace
+
+void describe_pose(SchemaVisitor& visitor, std::vector<double>& u_rad, int segments,
+                   Presence presence) {
+  const auto n = static_cast<std::size_t>(segments);
+  u_rad.resize(2 * n, 0.0);
+  if (visitor.prefers("u_rad", "theta_rad")) {
+    visitor.numbers({"u_rad", "rad", "[x, y] of every segment, u = theta [cos phi, sin phi]",
+                     from_to(-kTwoPi, kTwoPi), presence},
+                    {Shape::Kind::scalar_or_pairs, segments}, u_rad);
+    return;
+  }
+  std::vector<double> theta(n), phi(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    theta[i] = std::hypot(u_rad[2 * i], u_rad[2 * i + 1]);
+    phi[i] = theta[i] > 0.0 ? std::atan2(u_rad[2 * i + 1], u_rad[2 * i]) : 0.0;
+  }
+  const Shape shape = {Shape::Kind::scalar_or_list, segments};
+  visitor.numbers({"theta_rad", "rad", "bend of all segments, or a list (or u_rad: [[x, y], ...])",
+                   from_to(-kTwoPi, kTwoPi), presence},
+                  shape, theta);
+  visitor.numbers({"phi_rad", "rad", "direction of the bend of all segments, or a list",
+                   from_to(-100.0, 100.0)},
+                  shape, phi);
+  for (std::size_t i = 0; i < n && visitor.reading(); ++i) {
+    u_rad[2 * i] = theta[i] * std::cos(phi[i]);
+    u_rad[2 * i + 1] = theta[i] * std::sin(phi[i]);
+  }
+}
+
+void describe_reference(SchemaVisitor& visitor, ReferenceSettings& reference, int segments) {
+  auto& phases = reference.phases;
+  visitor.list(
+      {"reference",
+       "",
+       "phases that follow each other; time starts when ACTIVE does",
+       {},
+       kRequired},
+      static_cast<int>(phases.size()),
+      [&](int size) { phases.resize(static_cast<std::size_t>(size)); },
+      [&](int i) {
+        const auto index = static_cast<std::size_t>(i);
+        describe_phase(visitor, phases[index], index + 1 == phases.size(), segments);
+      });
+}
+
+void describe_daemon(SchemaVisitor& visitor, DaemonSettings& daemon, int segments) {
+  static const std::array<const char*, 2> kCaptureTimes = {"sender", "latency"};
+  visitor.number({"rate_hz", "Hz", "of the tick", from_to(1.0, 20000.0)}, daemon.rate_hz);
+  visitor.choice({"capture_time", "",
+                  "sender: its clock, related to ours; latency: arrival minus frame_latency_s"},
+                 kCaptureTimes, daemon.capture_time);
+  visitor.section({"safety", "", "thresholds of the safety monitor"}, SectionKind::plain,
+                  [&] { describe_safety(visitor, daemon.safety); });
+  visitor.section({"bodies", "", "which bodies of a frame carry the base and the segments' ends"},
+                  SectionKind::plain, [&] { describe_bodies(visitor, daemon.bodies, segments); });
+  visitor.section({"realtime", "", "the daemon's place on the machine"}, SectionKind::plain,
+                  [&] { describe_realtime(visitor, daemon.realtime); });
+  visitor.section({"lcm", "", "channels, distinct where two arms share a machine"},
+                  SectionKind::plain, [&] { describe_lcm(visitor, daemon.lcm); });
+}
+
+void describe_plant(SchemaVisitor& visitor, Experiment& experiment) {
+  PlantSettings& plant = experiment.plant;
+  if (visitor.reading()) {
+    plant.arm = experiment.arm;
+    plant.actuation = experiment.actuation;
+    plant.valves.supply_pressure_bar = experiment.actuation.max_pressure_bar;
+    plant.seed = experiment.seed;
+  }
+  const int n = plant.arm.size();
+  visitor.section({"mismatch", "", "factors on what the controller believes"},
+                  SectionKind::input_only, [&] { describe_mismatch(visitor, plant); });
+  visitor.section({"arm", "", "keys of `arm` that differ here (not segments)"},
+                  SectionKind::defaults_elsewhere, [&] { describe_arm(visitor, plant.arm); });
+  visitor.section({"actuation", "", "keys of `actuation` that differ here"},
+                  SectionKind::defaults_elsewhere,
+                  [&] { describe_actuation(visitor, plant.actuation, n); });
+  visitor.section({"valves", "", "between commanded and real pressure"}, SectionKind::plain, [&] {
+    visitor.number(
+        {"lag_s", "s", "time constant; 0: the command is the pressure", from_to(0.0, 10.0)},
+        plant.valves.lag_s);
+    visitor.number(
+        {"supply_pressure_bar", "bar", "no pressure above it; left out: actuation.max_pressure_bar",
+         above_to(0.0, 100.0)},
+        plant.valves.supply_pressure_bar);
+  });
+  visitor.section({"mocap", "", "simulated motion capture"}, SectionKind::plain,
+                  [&] { describe_mocap(visitor, plant.mocap); });
+  visitor.section({"initial", "", "where the arm starts, at rest"}, SectionKind::plain, [&] {
+    std::vector<double> u(plant.initial_u_rad.data(),
+                          plant.initial_u_rad.data() + plant.initial_u_rad.size());
+    describe_pose(visitor, u, n, Presence::optional);
+    plant.initial_u_rad = Eigen::Map<const Eigen::VectorXd>(u.data(), 2 * n);
+  });
+  std::vector<double> force(plant.tip_force_n.data(), plant.tip_force_n.data() + 3);
+  visitor.numbers(
+      {"tip_force_n", "N", "constant external force at the tip, world frame", from_to(-1e4, 1e4)},
+      {Shape::Kind::list, 3}, force);
+  plant.tip_force_n = Eigen::Map<const Eigen::Vector3d>(force.data());
+  visitor.number({"relative_tolerance", "", "of the integrator", from_to(1e-13, 1e-2)},
+                 plant.relative_tolerance);
+  visitor.number({"absolute_tolerance", "rad, rad/s", "of the integrator", from_to(1e-15, 1e-2)},
+                 plant.absolute_tolerance);
+}
+
+}  // namespace softarm

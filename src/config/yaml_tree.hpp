@@ -1,0 +1,39 @@
+// A YAML file as a plain tree that remembers where everything stood. Stricter than YAML: no
+// aliases, no tags, no duplicate keys, bounded depth and size; `include: FILE` at the top is merged
+// in.
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace softarm {
+
+struct Location {
+  std::shared_ptr<const std::string> file;
+  int line = 0;  ///< 1-based
+};
+
+struct YamlNode {
+  enum class Kind { nothing, scalar, list, map };
+  Kind kind = Kind::nothing;
+  bool quoted = false;            ///< a scalar in quotes is text, never a number
+  Location location;              ///< of the value
+  Location key_location;          ///< of its key, where it has one, else of the value
+  std::string text;               ///< of a scalar
+  std::vector<std::string> keys;  ///< of a map, one an item
+  std::vector<YamlNode> items;    ///< of a list or map
+
+  /// The item at `key` of a map; nullptr where there is none.
+  const YamlNode* find(std::string_view key) const;
+  /// What stands here, for messages: `"0.11"`, `a list of 3`, `nothing`.
+  std::string describe() const;
+};
+
+/// Reads a file with everything it includes; values of the including file win, maps are merged key
+/// by key. The root is a map. @throws ConfigError and nothing else.
+YamlNode read_yaml_file(const std::filesystem::path& file);
+
+}  // namespace softarm
