@@ -127,7 +127,14 @@ void ControlPipeline::use_frame(const MocapFrame& frame) noexcept {
 }
 
 void ControlPipeline::predict(std::int64_t at_ns) noexcept {
-  filter_.predict(at_ns, output_.motion);
+  const bool expects = safety_.mode() == Mode::active;
+  if (expects) expect(at_ns);
+  filter_.predict(at_ns, output_.motion, expects ? &known_ : nullptr);
+}
+
+void ControlPipeline::expect(std::int64_t at_ns) noexcept {
+  reference_.sample(seconds(at_ns), window_.now);
+  known_ = {window_.now.u, window_.now.velocity, window_.now.acceleration, activations_};
 }
 
 void ControlPipeline::take_reference(const TickInput& input) noexcept {

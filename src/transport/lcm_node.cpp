@@ -1,8 +1,12 @@
 #include "softarm/transport/lcm_node.hpp"
 
 #include <lcm/lcm.h>
+#include <poll.h>
 
+#include <algorithm>
 #include <cctype>
+
+#include "softarm/daemon/realtime.hpp"
 
 namespace softarm {
 namespace {
@@ -51,11 +55,17 @@ void LcmNode::subscribe(const std::string& channel, int capacity, Handler handle
 
 int LcmNode::drain(int limit) noexcept {
   int handled = 0;
-  while (handled < limit && wait(0)) ++handled;
+  while (handled < limit && lcm_handle_timeout(lcm_, 0) > 0) ++handled;
   return handled;
 }
 
-bool LcmNode::wait(int timeout_ms) noexcept { return lcm_handle_timeout(lcm_, timeout_ms) > 0; }
+bool LcmNode::wait_until(std::int64_t deadline_ns) noexcept {
+  // lcm_handle_timeout counts in milliseconds, which is too coarse for a plant in real time.
+  const std::int64_t left_ns = std::max<std::int64_t>(0, deadline_ns - monotonic_now_ns());
+  const timespec timeout{.tv_sec = left_ns / 1'000'000'000, .tv_nsec = left_ns % 1'000'000'000};
+  pollfd descriptor{.fd = lcm_get_fileno(lcm_), .events = POLLIN, .revents = 0};
+  return ppoll(&descriptor, 1, &timeout, nullptr) > 0 && lcm_handle_timeout(lcm_, 0) > 0;
+}
 
 bool LcmNode::send(const char* channel, int size) noexcept {
   return lcm_publish(lcm_, channel, buffer_.data(), static_cast<unsigned int>(size)) == 0;

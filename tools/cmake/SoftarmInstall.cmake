@@ -13,4 +13,5 @@ write_basic_package_version_file(${PROJECT_BINARY_DIR}/softarmConfigVersion.cmak
 install(FILES ${PROJECT_BINARY_DIR}/softarmConfig.cmake ${PROJECT_BINARY_DIR}/softarmConfigVersion.cmake
   ${PROJECT_SOURCE_DIR}/tools/cmake/SoftarmLcm.cmake DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/softarm)
 install(PROGRAMS tools/plot_run.py DESTINATION ${CMAKE_INSTALL_DATADIR}/softarm)
-install(DIRECTORY tools/plotting DESTINATION ${CMAKE_INSTALL_DATADIR}/softarm FILES_MATCHING PATTERN "*.py")
+install(DIRECTORY tools/plotting DESTINATION ${CMAKE_INSTALL_DATADIR}/softarm
+  FILES_MATCHING PATTERN "*.py" PATTERN "__pycache__" EXCLUDE)

@@ -9,4 +9,16 @@ namespace softarm {
 /// softarm check CONFIG | --template
 void add_check_command(CLI::App& app);
 
+/// softarm eval FILE [--mass point|distributed] [--method direct]
+void add_eval_command(CLI::App& app);
+
+/// softarm run CONFIG [--out DIR] [--duration S] [--seed N]
+void add_run_command(CLI::App& app);
+
+/// softarm watch CONFIG [--out DIR] [--duration S]
+void add_watch_command(CLI::App& app);
+
+/// softarm arm CONFIG, softarm disarm CONFIG
+void add_operator_commands(CLI::App& app);
+
 }  // namespace softarm

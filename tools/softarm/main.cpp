@@ -8,6 +8,10 @@ int main(int argc, char** argv) {
   CLI::App app("Tools for soft continuum arms under closed-loop control", "softarm");
   app.require_subcommand(0, 1);
   softarm::add_check_command(app);
+  softarm::add_eval_command(app);
+  softarm::add_run_command(app);
+  softarm::add_watch_command(app);
+  softarm::add_operator_commands(app);
   return softarm::run_program(argc, argv, app, [&app]() -> int {
     if (!app.get_subcommands().empty()) return softarm::kExitOk;
     std::cerr << app.help();

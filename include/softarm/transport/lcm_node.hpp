@@ -45,8 +45,9 @@ class LcmNode {
   /// handled.
   int drain(int limit) noexcept;
 
-  /// Waits up to `timeout_ms` for one message and handles it. Returns whether there was one.
-  bool wait(int timeout_ms) noexcept;
+  /// Waits for a message until `deadline_ns` of CLOCK_MONOTONIC and handles it. Returns whether
+  /// there was one; false also when a signal cut the wait short.
+  bool wait_until(std::int64_t deadline_ns) noexcept;
 
   /// Encodes into this node's buffer and publishes; false if it did not fit or was refused.
   /// Allocates nothing.

@@ -1,0 +1,18 @@
+// SIGTERM and SIGINT ask a program to end in good order.
+#pragma once
+
+#include <csignal>
+
+namespace softarm {
+
+inline volatile std::sig_atomic_t stop_requested = 0;
+
+/// From now on SIGTERM and SIGINT set `stop_requested` instead of ending the process.
+inline void catch_stop_signals() noexcept {
+  struct sigaction action {};
+  action.sa_handler = [](int) { stop_requested = 1; };
+  sigaction(SIGTERM, &action, nullptr);
+  sigaction(SIGINT, &action, nullptr);
+}
+
+}  // namespace softarm

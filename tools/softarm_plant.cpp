@@ -1,0 +1,134 @@
+// softarm-plant: the simulated arm in real time. Valve pressures in, motion-capture frames and
+// measured pressures out, in the messages the hardware speaks.
+#include <fmt/format.h>
+
+#include <utility>
+#include <vector>
+
+#include "program.hpp"
+#include "signals.hpp"
+#include "softarm/config/load.hpp"
+#include "softarm/daemon/realtime.hpp"
+#include "softarm/plant/simulated_arm.hpp"
+#include "softarm/transport/lcm_node.hpp"
+#include "softarm/transport/message_decoding.hpp"
+#include "softarm/transport/mocap_adapter.hpp"
+
+namespace softarm {
+namespace {
+
+class PlantProcess {
+ public:
+  explicit PlantProcess(const Experiment& experiment)
+      : lcm_(experiment.daemon.lcm),
+        adapter_(experiment.daemon.bodies, experiment.plant.arm),
+        node_(lcm_.url),
+        arm_(experiment.plant, monotonic_now_ns()),
+        report_period_ns_(static_cast<std::int64_t>(1e9 / experiment.plant.mocap.rate_hz)) {
+    // No exception may pass through LCM, so the handler only takes the message; the loop acts on
+    // it.
+    node_.subscribe(lcm_.command_channel, 64, [this](const ReceivedMessage& packet) {
+      command_received_ = decode(packet.bytes, command_message_);
+    });
+  }
+
+  void run() {
+    std::int64_t next_report_ns = monotonic_now_ns();
+    while (stop_requested == 0) {
+      node_.wait_until(std::min(next_report_ns, arm_.next_event_ns()));
+      if (std::exchange(command_received_, false)) take_command();
+      advance();
+      for (MocapFrame frame; arm_.receive(frame);) {
+        adapter_.to_message(frame, frame.capture_ns / 1000, frame_message_);
+        node_.publish(lcm_.mocap_channel, frame_message_);
+      }
+      if (arm_.time_ns() >= next_report_ns) {
+        publish_state();
+        next_report_ns = std::max(next_report_ns + report_period_ns_, arm_.time_ns());
+      }
+    }
+  }
+
+ private:
+  void advance() {
+    const bool was_vented = arm_.vented();
+    arm_.advance_to(monotonic_now_ns());
+    if (arm_.vented() && !was_vented)
+      fmt::print(stderr, "softarm-plant: commands have stopped; vented\n");
+  }
+
+  void take_command() {
+    pressure_bar_.assign(command_message_.pressure_bar.begin(),
+                         command_message_.pressure_bar.end());
+    const bool was_vented = arm_.vented();
+    const CommandVerdict verdict =
+        arm_.command({.sequence = command_message_.sequence,
+                      .validity_ns = std::int64_t{command_message_.validity_us} * 1000,
+                      .shadow = command_message_.shadow != 0,
+                      .pressure_bar = pressure_bar_},
+                     monotonic_now_ns());
+    if (was_vented && verdict == CommandVerdict::in_force)
+      fmt::print(stderr, "softarm-plant: commands have begun\n");
+  }
+
+  void publish_state() {
+    const ArmPlant& plant = arm_.plant();
+    const Eigen::VectorXd& pressure = arm_.measured_pressures_bar();
+    measurement_message_.time_us = arm_.time_ns() / 1000;
+    measurement_message_.sequence = arm_.sequence();
+    measurement_message_.num_chambers = static_cast<std::int16_t>(pressure.size());
+    measurement_message_.pressure_bar.assign(pressure.begin(), pressure.end());
+    node_.publish(lcm_.measurement_channel, measurement_message_);
+
+    const SegmentVector u = plant.u_rad();
+    const SegmentVector velocity = plant.velocity_radps();
+    state_message_.time_us = measurement_message_.time_us;
+    state_message_.vented = arm_.vented() ? 1 : 0;
+    state_message_.num_segments = static_cast<std::int16_t>(plant.segments());
+    state_message_.num_chambers = measurement_message_.num_chambers;
+    state_message_.u_rad.clear();
+    state_message_.velocity_radps.clear();
+    for (int i = 0; i < plant.segments(); ++i) {
+      state_message_.u_rad.push_back({u[2 * i], u[2 * i + 1]});
+      state_message_.velocity_radps.push_back({velocity[2 * i], velocity[2 * i + 1]});
+    }
+    state_message_.pressure_bar = measurement_message_.pressure_bar;
+    const Eigen::Vector3d tip = plant.tip_m();
+    for (int axis = 0; axis < 3; ++axis) state_message_.tip_m[axis] = tip[axis];
+    node_.publish(lcm_.plant_channel, state_message_);
+  }
+
+  LcmSettings lcm_;
+  MocapAdapter adapter_;
+  LcmNode node_;
+  SimulatedArm arm_;
+  std::int64_t report_period_ns_;
+  bool command_received_ = false;
+  std::vector<double> pressure_bar_;
+  softarm_messages::mocap_frame_t frame_message_;
+  softarm_messages::pressure_command_t command_message_;
+  softarm_messages::pressure_measurement_t measurement_message_;
+  softarm_messages::plant_state_t state_message_;
+};
+
+int serve(const std::string& path) {
+  const Experiment experiment = load_experiment(path);
+  catch_stop_signals();
+  fmt::print(stderr,
+             "softarm-plant {} commit {} configuration {} seed {}: {}, motion capture at {} Hz\n",
+             version_text(), commit_text(), hash_text(experiment.hash), experiment.seed,
+             experiment.name, experiment.plant.mocap.rate_hz);
+  PlantProcess(experiment).run();
+  return kExitOk;
+}
+
+}  // namespace
+}  // namespace softarm
+
+int main(int argc, char** argv) {
+  CLI::App app("The simulated arm in real time: valve pressures in, motion-capture frames out",
+               "softarm-plant");
+  std::string config;
+  app.add_option("CONFIG", config, "experiment in YAML")->required();
+  return softarm::run_program(argc, argv, app, [&] { return softarm::serve(config); });
+}

@@ -1,0 +1,207 @@
+// softarmd: the control daemon. Motion-capture frames in, valve pressures out, at a fixed rate.
+#include <fmt/format.h>
+
+#include <array>
+#include <atomic>
+#include <iostream>
+#include <thread>
+
+#include "program.hpp"
+#include "signals.hpp"
+#include "softarm/config/load.hpp"
+#include "softarm/control/gain_check.hpp"
+#include "softarm/daemon/realtime.hpp"
+#include "softarm/transport/daemon_link.hpp"
+
+namespace softarm {
+namespace {
+
+/// Hands mode changes from the tick's thread to one that may wait for a terminal or a journal.
+/// Bounded: what does not fit is counted, not queued.
+class ModeLog {
+ public:
+  ModeLog() : thread_([this](const std::stop_token& stop) { print_until(stop); }) {}
+
+  void add(std::int64_t since_start_ns, Mode mode, Reason reason) noexcept {
+    const std::size_t head = head_.load(std::memory_order_relaxed);
+    if (head - tail_.load(std::memory_order_acquire) == kCapacity) {
+      lost_.fetch_add(1, std::memory_order_relaxed);
+      return;
+    }
+    entries_[head % kCapacity] = {since_start_ns, mode, reason};
+    head_.store(head + 1, std::memory_order_release);
+  }
+
+ private:
+  static constexpr std::size_t kCapacity = 64;
+  struct Entry {
+    std::int64_t since_start_ns;
+    Mode mode;
+    Reason reason;
+  };
+
+  void print_until(const std::stop_token& stop) {
+    while (true) {
+      const bool last = stop.stop_requested();
+      for (std::size_t tail = tail_.load(); tail != head_.load(std::memory_order_acquire);
+           tail_.store(++tail)) {
+        const Entry& entry = entries_[tail % kCapacity];
+        fmt::print(stderr, "softarmd: {:.3f} s: {} ({})\n",
+                   1e-9 * static_cast<double>(entry.since_start_ns), name(entry.mode),
+                   name(entry.reason));
+      }
+      if (const auto lost = lost_.exchange(0); lost > 0)
+        fmt::print(stderr, "softarmd: {} mode changes came too fast to be printed\n", lost);
+      if (last) return;
+      std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    }
+  }
+
+  std::array<Entry, kCapacity> entries_{};
+  std::atomic<std::size_t> head_{0}, tail_{0};
+  std::atomic<std::int64_t> lost_{0};
+  std::jthread thread_;
+};
+
+/// Keeps the deadline, and the account of how well it was kept.
+class DaemonLoop {
+ public:
+  DaemonLoop(const Experiment& experiment, bool shadow)
+      : pipeline_(experiment),
+        link_(experiment,
+              {.version = fmt::format("{} {}", version_text(), commit_text()),
+               .configuration_hash = experiment.hash,
+               .seed = experiment.seed},
+              shadow),
+        judge_overruns_(experiment.daemon.realtime.fifo),
+        ticks_per_second_(static_cast<std::int64_t>(experiment.daemon.rate_hz)) {}
+
+  /// Returns once a stop was requested and every pressure has been commanded to zero.
+  void run() {
+    const std::int64_t start_ns = monotonic_now_ns();
+    PeriodicDeadline deadline(pipeline_.period_ns(), start_ns);
+    int vented_commands = 0;
+    while (vented_commands < kLastCommands) {
+      sleep_until_ns(deadline.next_ns());
+      const std::int64_t woken_ns = monotonic_now_ns();
+      if (woken_ns < deadline.next_ns()) continue;  // a signal cut the sleep short
+      timing_.lateness.add_ns(woken_ns - deadline.next_ns());
+      tick(woken_ns);
+      log_.changed(woken_ns - start_ns, pipeline_.output());
+      const std::int64_t missed = deadline.advance(monotonic_now_ns());
+      timing_.overruns += missed;
+      consecutive_overruns_ = missed > 0 ? consecutive_overruns_ + 1 : 0;
+      if (stop_requested != 0 && pipeline_.output().reason == Reason::shutdown &&
+          pipeline_.fully_vented())
+        ++vented_commands;
+    }
+  }
+
+  const LoopTiming& timing() const { return timing_; }
+  const ControlPipeline& pipeline() const { return pipeline_; }
+  const DaemonLink& link() const { return link_; }
+
+ private:
+  static constexpr int kLastCommands =
+      3;  ///< zero commands sent before leaving: one may be lost on the wire
+
+  void tick(std::int64_t woken_ns) noexcept {
+    TickInput input = link_.collect(woken_ns);
+    input.shutdown = stop_requested != 0;
+    input.consecutive_overruns = judge_overruns_ ? consecutive_overruns_ : 0;
+    const TickOutput& output = pipeline_.tick(input);
+    const std::int64_t decided_ns = monotonic_now_ns();
+    link_.publish_command(decided_ns, output);
+    ++timing_.ticks;
+    link_.publish_status(woken_ns, pipeline_, timing_);
+    if (timing_.ticks % ticks_per_second_ == 0) link_.publish_timing(woken_ns, timing_);
+    timing_.tick.add_ns(decided_ns - woken_ns);
+    timing_.publish.add_ns(monotonic_now_ns() - decided_ns);
+    if (output.frame_age_s >= 0.0)
+      timing_.frame_age.add_ns(static_cast<std::int64_t>(1e9 * output.frame_age_s));
+  }
+
+  struct ModeWatch {
+    void changed(std::int64_t since_start_ns, const TickOutput& output) noexcept {
+      if (output.mode == mode && output.reason == reason) return;
+      mode = output.mode;
+      reason = output.reason;
+      log.add(since_start_ns, mode, reason);
+    }
+    Mode mode = Mode::init;
+    Reason reason = Reason::none;
+    ModeLog log;
+  };
+
+  ControlPipeline pipeline_;
+  DaemonLink link_;
+  bool judge_overruns_;
+  std::int64_t ticks_per_second_;
+  int consecutive_overruns_ = 0;
+  LoopTiming timing_;
+  ModeWatch log_;
+};
+
+void print_summary(const DaemonLoop& loop) {
+  const LoopTiming& timing = loop.timing();
+  const auto line = [](const char* what, const DurationHistogram& histogram) {
+    fmt::print(stderr, "softarmd: {:<10} p50 {:>8.1f} us   p99 {:>8.1f} us   max {:>8.1f} us\n",
+               what, quantile_us(histogram.counts(), 0.5), quantile_us(histogram.counts(), 0.99),
+               histogram.max_us());
+  };
+  line("lateness", timing.lateness);
+  line("frame age", timing.frame_age);
+  line("tick", timing.tick);
+  line("publish", timing.publish);
+  const FrameCounters& frames = loop.pipeline().counters();
+  fmt::print(
+      stderr,
+      "softarmd: {} ticks, {} missed; frames: {} accepted, {} rejected, {} repeated, {} missing; "
+      "{} malformed messages, {} not sent\n",
+      timing.ticks, timing.overruns, frames.accepted,
+      frames.rejected() + loop.pipeline().late_frames(), frames.repeated, frames.missing,
+      loop.link().malformed(), loop.link().unsent());
+}
+
+int serve(const std::string& path, bool shadow) {
+  const Experiment experiment = load_experiment(path);
+  const LcmSettings& lcm = experiment.daemon.lcm;
+  const std::string channel = lcm.command_channel + (shadow ? " (shadow)" : "");
+  std::unique_ptr<InstanceLock> lock;
+  try {
+    lock = std::make_unique<InstanceLock>(channel + " on " + lcm.url);
+  } catch (const std::runtime_error& error) {
+    print_error("softarmd", error.what());
+    return kExitOtherInstance;
+  }
+  catch_stop_signals();
+
+  fmt::print(stderr, "softarmd {} commit {} configuration {:016x} seed {}: {} at {} Hz{}\n",
+             version_text(), commit_text(), experiment.hash, experiment.seed, experiment.name,
+             experiment.daemon.rate_hz,
+             shadow ? ", shadow: commands are marked as not for the valves" : "");
+  for (const std::string& warning :
+       gain_warnings(experiment.arm, experiment.control, largest_theta_rad(experiment.reference)))
+    fmt::print(stderr, "softarmd: warning: {}\n", warning);
+  // LCM's receive thread inherits the scheduling in force when it starts, so that comes first.
+  for (const std::string& refused : apply_realtime_settings(experiment.daemon.realtime))
+    fmt::print(stderr, "softarmd: warning: {}\n", refused);
+  DaemonLoop loop(experiment, shadow);
+  loop.run();
+  print_summary(loop);
+  return kExitOk;
+}
+
+}  // namespace
+}  // namespace softarm
+
+int main(int argc, char** argv) {
+  CLI::App app(
+      "Control daemon for soft continuum arms: motion-capture frames in, valve pressures out",
+      "softarmd");
+  std::string config;
+  bool shadow = false;
+  app.add_option("CONFIG", config, "experiment in YAML")->required();
+  app.add_flag("--shadow", shadow, "run everything, but mark commands as not for the valves");
+  return softarm::run_program(argc, argv, app, [&] { return softarm::serve(config, shadow); });
+}
