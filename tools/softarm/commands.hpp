@@ -12,6 +12,9 @@ void add_check_command(CLI::App& app);
 /// softarm eval FILE [--mass point|distributed] [--method direct]
 void add_eval_command(CLI::App& app);
 
+/// softarm import CSV MAP.yaml --out LOG
+void add_import_command(CLI::App& app);
+
 /// softarm run CONFIG [--out DIR] [--duration S] [--seed N]
 void add_run_command(CLI::App& app);
 
