@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include "model/own_columns.hpp"
 #include "model/segment_geometry.hpp"
 #include "softarm/model/dynamics.hpp"
 
@@ -23,14 +24,14 @@ struct SegmentForces {
 /// Full matrices: a segment's columns, all in S_{i-1}. A dot is a time derivative in the world,
 /// seen from S_{i-1}.
 struct SegmentColumns {
-  double ux, uy;
   Turn turn;
-  Vector3 tip;                                ///< p_i - p_{i-1}
-  Vector3 tip_rate;                           ///< its rate
-  Vector3 spin;                               ///< angular velocity of S_{i-1}
-  PairVector3 translation, translation_rate;  ///< of the tip p_i for unit u_x', u_y'
-  PairVector3 rotation, rotation_rate;        ///< of S_i
+  double mass;
+  Vector3 tip;       ///< p_i - p_{i-1}
+  Vector3 tip_rate;  ///< its rate
   Vector3 gravity;
+  PairVector3 translation, translation_rate;  ///< v: motion of p_i for unit u_x', u_y'
+  PairVector3 rotation, rotation_rate;        ///< w: angular velocity of S_i for the same
+  OwnColumns own;
 };
 
 struct DynamicsWorkspace::Storage {

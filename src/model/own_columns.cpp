@@ -1,0 +1,104 @@
+#include "model/own_columns.hpp"
+
+namespace softarm {
+namespace {
+
+/// Terms of `arc_columns`, each for both columns e side by side. In the plane of S_{i-1}: J (x, y)
+/// = (-y, x), u the bending, e the unit vectors, v = u'.
+struct ArcColumnTerms {
+  const ArcMoments& m;
+  double ux, uy, s;
+  Direction v;
+  Vector3 spin;
+  double spin_u;  ///< u . spin
+  Pair u, dv;
+  Pair kappa;     ///< u_e (u . v)
+  Pair g_x, g_y;  ///< (u . v) e + u_e v + v_e u
+
+  ArcColumnTerms(const OwnState& state, const ArcMoments& moments) noexcept
+      : m(moments),
+        ux(state.ux),
+        uy(state.uy),
+        s(ux * ux + uy * uy),
+        v(state.v),
+        spin(state.spin),
+        spin_u(ux * spin.x + uy * spin.y),
+        u{ux, uy},
+        dv{v.x, v.y},
+        kappa(v.along * u),
+        g_x(Pair{v.along, 0.0} + v.x * u + ux * dv),
+        g_y(Pair{0.0, v.along} + v.y * u + uy * dv) {}
+
+  PairVector3 angular() const noexcept {
+    const double bend = m.qp1 - m.pq1;
+    return {-(Pair{0.0, m.pq} + (bend * uy) * u), Pair{m.pq, 0.0} + (bend * ux) * u,
+            m.pp * turned(ux, uy)};
+  }
+
+  /// int r x (rate of J_e within S_{i-1}) + int r x (spin x J_e)
+  PairVector3 angular_rate() const noexcept {
+    const Pair axial = m.pq1 * dv + (m.pq2 - m.qp2) * kappa;
+    const double plane = m.pp * spin_u + m.pq * spin.z;
+    const Pair stretch = (m.pp1 * spin_u + m.qp1 * spin.z) * u;
+    const Pair radial = m.trace_rate(s) * u;
+    return {
+        uy * axial - m.qp1 * g_y + spin.x * radial - Pair{plane, 0.0} - ux * stretch,
+        m.qp1 * g_x - ux * axial + spin.y * radial - Pair{0.0, plane} - uy * stretch,
+        m.pp1 * (ux * g_y - uy * g_x) + spin.z * radial - (m.pq1 * spin_u + m.qq1 * spin.z) * u};
+  }
+
+  /// int (spin x r) x J_e + int (dr along v) x J_e
+  PairVector3 flow() const noexcept {
+    const Pair spin_e{spin.x, spin.y};
+    const Pair plane = m.pp * spin_e + (m.pp1 * spin_u + m.pq1 * spin.z) * u;
+    const Pair radial = m.trace_rate(s) * u;
+    const double across = v.x * uy - v.y * ux;
+    return {ux * plane - spin.x * radial + m.pq1 * (v.y * u - Pair{0.0, v.along}),
+            uy * plane - spin.y * radial + m.pq1 * (Pair{v.along, 0.0} - v.x * u),
+            m.pq * spin_e + (m.qp1 * spin_u + m.qq1 * spin.z) * u - spin.z * radial +
+                m.pp * turned(v.x, v.y) + m.pp1 * (across * u + v.along * turned(ux, uy))};
+  }
+
+  /// Row e of int J_e . J_f' without the part of the spin; f side by side.
+  Pair coriolis_row(double u_e, const Pair& g_e) const noexcept {
+    return m.pp1 * g_e + u_e * ((m.pp2 + 2.0 * m.p1p1 + m.p1p2 * s + m.q1q2) * kappa +
+                                (m.p1p1 * s + m.q1q1) * dv);
+  }
+
+  /// int {y, y'} y_i: second moment and, from it, spin and bending.
+  PairVector3 second_row(const Vector3& W, double on_v, double on_u, double on_z) const noexcept {
+    const Vector3 rate = cross(spin, W) + Vector3{on_v * v.x + on_u * v.along * ux,
+                                                  on_v * v.y + on_u * v.along * uy, on_z * v.along};
+    return side_by_side(W, rate);
+  }
+};
+
+}  // namespace
+
+OwnColumns arc_columns(const OwnState& state, const Curve& centre, const ArcMoments& m) noexcept {
+  const ArcColumnTerms t(state, m);
+  const double ux = state.ux, uy = state.uy, mass = state.mass;
+  const Vector3 r = point(centre, ux, uy);
+  OwnColumns out;
+  const PairVector3 J = columns(centre, ux, uy);
+  out.momentum = mass * J;
+  out.momentum_rate = mass * (column_rates(centre, ux, uy, state.v) + cross(state.spin, J));
+  out.first = mass * side_by_side(r, first(centre, ux, uy, state.v) + cross(state.spin, r));
+  out.angular = t.angular();
+  out.angular_rate = t.angular_rate();
+  out.flow = t.flow();
+  const double stretch = 2.0 * m.pp1 + m.p1p1 * t.s + m.q1q1;
+  out.inertia_x = Pair{m.pp, 0.0} + (stretch * ux) * t.u;
+  out.inertia_y = Pair{0.0, m.pp} + (stretch * uy) * t.u;
+  // spin . int J_y x J_x, skew in the two columns
+  const double skew = m.pq1 * t.spin_u - t.spin.z * (m.pp + m.pp1 * t.s);
+  out.coriolis_x = t.coriolis_row(ux, t.g_x) + Pair{0.0, skew};
+  out.coriolis_y = t.coriolis_row(uy, t.g_y) + Pair{-skew, 0.0};
+  out.second = {
+      t.second_row({m.pp * ux * ux, m.pp * ux * uy, m.pq * ux}, m.pp * ux, m.pp1 * ux, m.pq1 * ux),
+      t.second_row({m.pp * ux * uy, m.pp * uy * uy, m.pq * uy}, m.pp * uy, m.pp1 * uy, m.pq1 * uy),
+      t.second_row({m.pq * ux, m.pq * uy, m.qq}, m.pq, m.qp1, m.qq1)};
+  return out;
+}
+
+}  // namespace softarm
