@@ -15,10 +15,10 @@
 namespace softarm {
 
 struct IntegratorSettings {
-  IntegratorMethod method = IntegratorMethod::sdirk4;
+  IntegratorMethod method = IntegratorMethod::cash4;
   double relative_tolerance = 1e-6;
   double absolute_tolerance = 1e-8;           ///< of x and of energies (J)
-  double absolute_tolerance_velocity = 1e-6;  ///< of v
+  double absolute_tolerance_velocity = 1e-5;  ///< of v
   bool account_energy = false;                ///< integrate work and dissipation along
 };
 

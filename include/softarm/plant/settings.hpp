@@ -36,7 +36,7 @@ enum class IntegratorMethod {
 };
 
 /// The absolute tolerance of u' (rad/s) over that of u (rad), in 1/s.
-inline constexpr double kVelocityTolerance = 100.0;
+inline constexpr double kVelocityTolerance = 1000.0;
 
 /// What the integrator has done so far.
 struct IntegratorCounters {
@@ -56,7 +56,7 @@ struct PlantSettings {
   SegmentVector initial_u_rad;  ///< at rest
   Eigen::Vector3d tip_force_n =
       Eigen::Vector3d::Zero();  ///< constant external force at the tip, world frame
-  IntegratorMethod method = IntegratorMethod::sdirk4;
+  IntegratorMethod method = IntegratorMethod::cash4;
   double relative_tolerance = 1e-6;  ///< of the SUNDIALS integrator
   double absolute_tolerance = 1e-8;  ///< of u (rad); kVelocityTolerance times that of u' (rad/s)
   bool account_energy = false;       ///< integrate work and dissipation along

@@ -122,7 +122,7 @@ TEST(ArkodeIntegrator, AStepInTheForceNeedsNoRestart) {
     expected += (now - before) * step(0.5 - 1e-3 * k);
   }
   EXPECT_NEAR(integrator.x()[0], expected, 1e-10);
-  EXPECT_LT(integrator.counters().linearizations, 10);
+  EXPECT_LT(integrator.counters().linearizations, 50);
 }
 
 TEST(ArkodeIntegrator, AccountsForEnergy) {
