@@ -6,7 +6,16 @@
 #include <cctype>
 #include <cmath>
 #include <cstring>
+#include <memory>
 #include <set>
+#include <stdexcept>
+
+#include "softarm/actuation/pressure_allocator.hpp"
+#include "softarm/config/load.hpp"
+#include "softarm/control/curvature_controller.hpp"
+#include "softarm/control/gain_check.hpp"
+#include "softarm/control/reference.hpp"
+#include "softarm/daemon/safety_monitor.hpp"
 
 namespace softarm {
 namespace {
@@ -14,6 +23,7 @@ namespace {
 /// A stop vents within this time, whatever the pressures were.
 constexpr double kLongestVent_s = 1.0;
 constexpr double kRotationTolerance = 1e-6;
+constexpr double kInPlane_rad = 1e-6;
 
 class Checks {
  public:
@@ -30,6 +40,7 @@ class Checks {
     check_bodies();
     check_safety();
     check_lcm();
+    check_rooms();
   }
 
  private:
@@ -84,9 +95,19 @@ class Checks {
     }
   }
 
+  /// Distance (rad) of a segment's u from the plane of a planar arm.
+  double out_of_plane(double x, double y) const {
+    if (!experiment_.actuation.plane_rad) return 0.0;
+    const double plane = *experiment_.actuation.plane_rad;
+    return std::abs(y * std::cos(plane) - x * std::sin(plane));
+  }
+
   void check_pose(const std::string& key, const std::vector<double>& u) const {
     for (std::size_t i = 0; i + 1 < u.size(); i += 2) {
       const double theta = std::hypot(u[i], u[i + 1]);
+      const double outside = out_of_plane(u[i], u[i + 1]);
+      require(outside < kInPlane_rad, key, "a bend in the plane of actuation.plane_rad",
+              fmt::format("{:.3g} rad out of it in segment {}", outside, i / 2 + 1));
       require(theta <= experiment_.control.max_theta_rad, key,
               fmt::format("theta within control.max_theta_rad ({} rad)",
                           experiment_.control.max_theta_rad),
@@ -101,7 +122,15 @@ class Checks {
       if (const auto* hold = std::get_if<SetPointReference>(&phases[i].kind)) {
         check_pose(key, hold->u_rad);
       } else if (const auto* paper = std::get_if<PaperReference>(&phases[i].kind)) {
-        check_pose(key + ".theta_rad", {paper->theta_rad, 0.0});
+        require(paper->theta_rad <= experiment_.control.max_theta_rad, key + ".theta_rad",
+                fmt::format("at most control.max_theta_rad ({} rad)",
+                            experiment_.control.max_theta_rad),
+                fmt::format("{} rad", paper->theta_rad));
+        const double outside =
+            out_of_plane(std::cos(paper->phi_centre_rad), std::sin(paper->phi_centre_rad));
+        require(!experiment_.actuation.plane_rad ||
+                    (outside < kInPlane_rad && paper->phi_amplitude_rad == 0.0),
+                key, "a reference in the plane of actuation.plane_rad", "one that leaves it");
       } else if (const auto* way = std::get_if<WayPointReference>(&phases[i].kind)) {
         check_way_points(key + ".points", *way);
       }
@@ -175,14 +204,76 @@ class Checks {
             "an LCM provider, such as udpm://239.255.76.67:7667?ttl=0", "\"" + lcm.url + "\"");
   }
 
+  /// What the rooms themselves refuse: a map of chambers that cannot reach every direction, and the
+  /// like.
+  template <typename Build>
+  void check_room(const std::string& key, const std::string& expected, const Build& build) const {
+    try {
+      build();
+    } catch (const std::invalid_argument& error) {
+      throw reader_.error_at(key, expected, error.what());
+    }
+  }
+
+  void check_rooms() const {
+    const std::string spanning = "chambers that reach a torque in every direction the arm needs";
+    check_room("actuation.chambers", spanning,
+               [&] { PressureAllocator allocator(experiment_.actuation); });
+    check_room("plant.actuation.chambers", spanning,
+               [&] { PressureAllocator allocator(experiment_.plant.actuation); });
+    check_room("control", "settings the controller can use", [&] {
+      std::make_unique<CurvatureController>(experiment_.arm, experiment_.control);
+    });
+    check_room("reference", "a reference that can be followed", [&] {
+      Reference reference(experiment_.reference, experiment_.control, experiment_.arm.size());
+    });
+  }
+
   const Experiment& experiment_;
   const ExperimentReader& reader_;
 };
+
+/// The largest theta (rad) that the phases themselves ask for.
+double largest_theta(const ReferenceSettings& reference) {
+  double largest = 0.0;
+  const auto consider = [&largest](const std::vector<double>& u) {
+    for (std::size_t i = 0; i + 1 < u.size(); i += 2) {
+      largest = std::max(largest, std::hypot(u[i], u[i + 1]));
+    }
+  };
+  for (const ReferencePhase& phase : reference.phases) {
+    if (const auto* hold = std::get_if<SetPointReference>(&phase.kind)) consider(hold->u_rad);
+    if (const auto* paper = std::get_if<PaperReference>(&phase.kind)) {
+      largest = std::max(largest, paper->theta_rad);
+    }
+    if (const auto* way = std::get_if<WayPointReference>(&phase.kind)) {
+      for (const WayPoint& point : way->points) consider(point.u_rad);
+    }
+  }
+  return largest;
+}
 
 }  // namespace
 
 void check_consistency(const Experiment& experiment, const ExperimentReader& reader) {
   Checks(experiment, reader).run();
+}
+
+std::vector<std::string> experiment_warnings(const Experiment& experiment) {
+  auto warnings =
+      gain_warnings(experiment.arm, experiment.control, largest_theta(experiment.reference));
+  const SafetyThresholds thresholds =
+      resolve_thresholds(experiment.daemon.safety, 1.0 / experiment.daemon.rate_hz);
+  const MocapSettings& mocap = experiment.plant.mocap;
+  const double oldest_s = mocap.latency_s + 1.0 / mocap.rate_hz;
+  const double hold_s = 1e-9 * static_cast<double>(thresholds.hold_after_ns);
+  if (oldest_s > hold_s) {
+    warnings.push_back(fmt::format(
+        "plant.mocap: its frames get {:.3g} s old, daemon.safety holds after {:.3g} s: the "
+        "simulated arm will never stay ACTIVE",
+        oldest_s, hold_s));
+  }
+  return warnings;
 }
 
 }  // namespace softarm

@@ -29,6 +29,28 @@ std::string print(const Experiment& experiment, Documentation documentation) {
   return writer.text();
 }
 
+/// What the template shows where a key has no default: a short arm that goes through every kind of
+/// reference.
+Experiment example_experiment() {
+  Experiment example;
+  example.name = "my experiment";
+  example.arm.segments.resize(2);
+  const std::vector<Chamber> chambers = {{0.0, 0.839}, {2.0, 0.839}, {4.0, 0.839}};
+  example.actuation.segments.assign(2, chambers);
+  example.control.kp.assign(4, 1.0);
+  example.control.kd.assign(4, 0.0);
+  example.plant.arm = example.arm;
+  example.plant.actuation = example.actuation;
+  example.plant.initial_u_rad.setZero(4);
+  const std::vector<WayPoint> points = {
+      {0.0, {0.0, 0.0, 0.0, 0.0}}, {2.0, {0.3, 0.0, 0.5, 0.0}}, {4.0, {0.0, 0.0, 0.0, 0.0}}};
+  example.reference.phases = {{LiveReference{}, 5.0},
+                              {SetPointReference{{0.2, 0.0, 0.2, 0.0}}, 5.0},
+                              {WayPointReference{points, true}, 20.0},
+                              {PaperReference{}, 0.0}};
+  return example;
+}
+
 Experiment read(const std::filesystem::path& file) {
   const YamlNode root = read_yaml_file(file);
   ExperimentReader reader(root);
@@ -53,6 +75,19 @@ Experiment load_experiment(const std::filesystem::path& file) {
 
 std::string resolved_text(const Experiment& experiment) {
   return print(experiment, Documentation::units);
+}
+
+std::string template_text() {
+  constexpr const char* kHeader =
+      R"(# Every key of an experiment, with its meaning, type, range and unit. Printed by `softarm check --template`.
+#
+# A key that is not marked as required may be left out and then has the value shown here. Unknown and repeated keys,
+# wrong types and values out of range are refused. Angles are radians and may be written as multiples of pi:
+# pi/2, -pi, 3*pi/4, 0.2*pi/180. `include: FILE` (relative to this file) takes over what FILE says; what stands here
+# wins, key by key.
+
+)";
+  return kHeader + print(example_experiment(), Documentation::full);
 }
 
 std::string hash_text(std::uint64_t hash) { return fmt::format("{:016x}", hash); }

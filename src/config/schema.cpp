@@ -77,7 +77,11 @@ void describe_chambers(SchemaVisitor& visitor, std::vector<Chamber>& chambers) {
 std::string Range::text() const {
   constexpr double kUnbounded = std::numeric_limits<double>::max();
   if (low == -kUnbounded && high == kUnbounded) return "";
-  return fmt::format("in {}{}, {}]", above_low ? "(" : "[", low, high);
+  const auto bound = [](double value) {
+    if (std::abs(value) == kTwoPi) return std::string(value < 0.0 ? "-2*pi" : "2*pi");
+    return fmt::format("{}", value);
+  };
+  return fmt::format("in {}{}, {}]", above_low ? "(" : "[", bound(low), bound(high));
 }
 
 void describe_arm(SchemaVisitor& visitor, ArmParameters& arm) {

@@ -30,7 +30,8 @@ void describe_paper(SchemaVisitor& visitor, PaperReference& paper) {
 }
 
 void describe_way_points(SchemaVisitor& visitor, WayPointReference& reference, int segments) {
-  visitor.flag({"repeat", "", "start again after the last point"}, reference.repeat);
+  visitor.flag({"repeat", "", "start again after the last point, which then equals the first"},
+               reference.repeat);
   visitor.list(
       {"points", "", "at rest in each, minimum jerk between them", {}, kRequired},
       static_cast<int>(reference.points.size()),
@@ -215,8 +216,9 @@ void describe_pose(SchemaVisitor& visitor, std::vector<double>& u_rad, int segme
                    from_to(-100.0, 100.0)},
                   shape, phi);
   for (std::size_t i = 0; i < n && visitor.reading(); ++i) {
-    u_rad[2 * i] = theta[i] * std::cos(phi[i]);
-    u_rad[2 * i + 1] = theta[i] * std::sin(phi[i]);
+    // Adding zero makes a negative zero positive, so that what is printed reads back the same.
+    u_rad[2 * i] = theta[i] * std::cos(phi[i]) + 0.0;
+    u_rad[2 * i + 1] = theta[i] * std::sin(phi[i]) + 0.0;
   }
 }
 
@@ -290,9 +292,13 @@ void describe_plant(SchemaVisitor& visitor, Experiment& experiment) {
       {"tip_force_n", "N", "constant external force at the tip, world frame", from_to(-1e4, 1e4)},
       {Shape::Kind::list, 3}, force);
   plant.tip_force_n = Eigen::Map<const Eigen::Vector3d>(force.data());
+  static const std::array<const char*, 3> kMethods = {"sdirk2", "cash4", "sdirk4"};
+  visitor.choice({"integrator", "", "diagonally implicit Runge-Kutta method of SUNDIALS ARKODE"},
+                 kMethods, plant.method);
   visitor.number({"relative_tolerance", "", "of the integrator", from_to(1e-13, 1e-2)},
                  plant.relative_tolerance);
-  visitor.number({"absolute_tolerance", "rad, rad/s", "of the integrator", from_to(1e-15, 1e-2)},
+  visitor.number({"absolute_tolerance", "rad",
+                  "of the integrator, for u; 100 times that for u' in rad/s", from_to(1e-15, 1e-2)},
                  plant.absolute_tolerance);
 }
 

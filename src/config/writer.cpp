@@ -58,20 +58,24 @@ std::string quoted(const std::string& text) {
 
 }  // namespace
 
+/// Indentation, and what makes a hint of a line that is not in force: "# " at the depth where the
+/// hint starts.
+std::string ExperimentWriter::margin(int depth) const {
+  if (!hint_depth_) return std::string(static_cast<std::size_t>(2 * depth), ' ');
+  return fmt::format("{:{}}# {:{}}", "", 2 * *hint_depth_, "", 2 * (depth - *hint_depth_));
+}
+
 void ExperimentWriter::line(const std::string& content) {
-  int indent = 2 * depth_;
-  if (dash_) indent -= 2;
-  out_ += fmt::format("{}{:{}}{}{}\n", commented_out_ ? "# " : "", "", indent, dash_ ? "- " : "",
-                      content);
+  out_ += fmt::format("{}{}{}\n", margin(dash_ ? depth_ - 1 : depth_), dash_ ? "- " : "", content);
   dash_ = false;
 }
 
 /// A comment of its own, wrapped.
 void ExperimentWriter::comment(const std::string& content) {
-  const std::string indent(static_cast<std::size_t>(2 * depth_), ' ');
+  const std::string indent = margin(depth_);
+  const std::size_t width = kDocWidth - indent.size() - 2;
   std::string_view rest = content;
   while (!rest.empty()) {
-    const std::size_t width = kDocWidth - indent.size() - 2;
     std::size_t cut = rest.size() <= width ? rest.size() : rest.rfind(' ', width);
     if (cut == std::string_view::npos) cut = rest.size();
     out_ += fmt::format("{}# {}\n", indent, rest.substr(0, cut));
@@ -81,6 +85,7 @@ void ExperimentWriter::comment(const std::string& content) {
 
 void ExperimentWriter::document(const Field& field, const std::string& what) {
   if (!documented_ || brief_) return;
+  if (lists_ > 0 && !told_.insert(fmt::format("{}: {}", field.key, field.doc)).second) return;
   std::string facts = what;
   const auto add = [&facts](const std::string& separator, const std::string& fact) {
     if (!fact.empty()) facts.append(facts.empty() ? "" : separator).append(fact);
@@ -105,9 +110,9 @@ void ExperimentWriter::number(const Field& field, double& value) {
 void ExperimentWriter::optional_number(const Field& field, std::optional<double>& value) {
   if (value) return number(field, *value);
   if (!documented_) return;
-  const bool outer = std::exchange(commented_out_, true);
+  const auto outer = std::exchange(hint_depth_, hint_depth_.value_or(depth_));
   entry(field, "0", "number");
-  commented_out_ = outer;
+  hint_depth_ = outer;
 }
 
 void ExperimentWriter::numbers(const Field& field, const Shape& shape,
@@ -168,13 +173,14 @@ void ExperimentWriter::section(const Field& field, SectionKind kind, const Body&
   const bool hint = documented_ && kind != SectionKind::plain;
   if (documented_ && depth_ == 0) out_ += "\n";
   document(field, "");
-  const bool outer_hint = std::exchange(commented_out_, commented_out_ || hint);
+  const auto outer_hint = hint_depth_;
+  if (hint && !hint_depth_) hint_depth_ = depth_;
   const bool outer_brief = std::exchange(brief_, brief_ || kind == SectionKind::defaults_elsewhere);
   line(fmt::format("{}:", field.key));
   ++depth_;
   body();
   --depth_;
-  commented_out_ = outer_hint;
+  hint_depth_ = outer_hint;
   brief_ = outer_brief;
 }
 
@@ -192,7 +198,9 @@ void ExperimentWriter::list(const Field& field, int size, const std::function<vo
   if (documented_ && depth_ == 0) out_ += "\n";
   document(field, "");
   line(fmt::format("{}:", field.key));
+  ++lists_;
   items(size, item);
+  --lists_;
 }
 
 void ExperimentWriter::shared_or_list(const Field& field, int count, bool all_equal_items,

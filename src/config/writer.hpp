@@ -1,6 +1,8 @@
 // The printing visitor: the resolved configuration with units, or the documented template.
 #pragma once
 
+#include <optional>
+#include <set>
 #include <string>
 
 #include "config/schema.hpp"
@@ -39,6 +41,7 @@ class ExperimentWriter : public SchemaVisitor {
   using SchemaVisitor::integer;
 
  private:
+  std::string margin(int depth) const;
   void document(const Field& field, const std::string& what);
   void entry(const Field& field, const std::string& value, const std::string& what);
   void line(const std::string& content);
@@ -48,9 +51,11 @@ class ExperimentWriter : public SchemaVisitor {
   std::string out_;
   int depth_ = 0;
   bool documented_;
-  bool commented_out_ = false;  ///< hints that are not in force
-  bool brief_ = false;          ///< keys already documented elsewhere
-  bool dash_ = false;           ///< the next line starts an item of a list
+  std::optional<int> hint_depth_;  ///< where a hint starts that is not in force
+  bool brief_ = false;             ///< keys already documented elsewhere
+  bool dash_ = false;              ///< the next line starts an item of a list
+  int lists_ = 0;                  ///< around this place
+  std::set<std::string> told_;     ///< keys already documented in items before
 };
 
 }  // namespace softarm

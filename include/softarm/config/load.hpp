@@ -20,6 +20,14 @@ Experiment load_experiment(const std::filesystem::path& file);
 /// the same experiment.
 std::string resolved_text(const Experiment& experiment);
 
+/// Every key with its meaning, type, unit, range and default, as a configuration that loads
+/// (config/template.yaml).
+std::string template_text();
+
+/// What is allowed but probably not meant, as sentences for a person: gains that the declared delay
+/// does not allow, motion capture too slow for the safety thresholds. Empty if all is well.
+std::vector<std::string> experiment_warnings(const Experiment& experiment);
+
 /// Sixteen hexadecimal digits, as logs and the status message show Experiment::hash.
 std::string hash_text(std::uint64_t hash);
 
