@@ -41,10 +41,12 @@ def _source_handles(log):
 
 def _near(phi, phi_reference):
     """phi on the turn that is closest to the reference; without one, unwrapped over its valid stretch."""
-    if phi_reference is not None:
-        known = np.isfinite(phi_reference)
-        return np.where(known, phi_reference + wrapped(phi - np.where(known, phi_reference, 0)), phi)
-    return _unwrapped(phi)
+    known = np.zeros(0, dtype=int) if phi_reference is None else np.flatnonzero(np.isfinite(phi_reference))
+    if not known.size:
+        return _unwrapped(phi)
+    # Where the reference is straight or silent, its neighbours in time say which turn is meant.
+    filled = np.interp(np.arange(len(phi)), known, phi_reference[known])
+    return filled + wrapped(phi - filled)
 
 
 def _unwrapped(phi):
@@ -229,11 +231,13 @@ HISTOGRAM_TITLES = {"lateness_us": "wake-up after the deadline", "frame_age_us":
                     "tick_us": "tick, wake-up to command", "publish_us": "publishing"}
 
 
-def _finite_edges(edges):
-    """Edges for a logarithmic axis: an open or zero end gets a place of its own."""
+def _finite_edges(edges, buckets):
+    """Edges for a logarithmic axis, one more than buckets: an open or zero end gets a place of its own."""
     edges = [np.nan if edge is None else float(edge) for edge in edges]
+    if len(edges) == buckets:  # lower edges only
+        edges.append(np.nan)
     if not np.isfinite(edges[-1]):
-        edges[-1] = 2 * edges[-2]
+        edges[-1] = edges[-2] ** 2 / edges[-3]
     if edges[0] <= 0:
         edges[0] = edges[1] / 2
     return np.array(edges)
@@ -259,7 +263,8 @@ def tick_times(log, directory):
     for axes in grid.flat[len(histograms):]:
         axes.set_visible(False)
     for axes, (name, histogram) in zip(grid.flat, histograms.items()):
-        edges, counts = _finite_edges(histogram["edges_us"]), np.array(histogram["counts"], dtype=float)
+        counts = np.array(histogram["counts"], dtype=float)
+        edges = _finite_edges(histogram["edges_us"], len(counts))
         filled = np.flatnonzero(counts)
         first, last = max(filled[0] - 1, 0), min(filled[-1] + 2, len(counts))
         axes.bar(edges[first:last], counts[first:last], width=np.diff(edges[first:last + 1]), align="edge",
