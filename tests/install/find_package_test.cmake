@@ -13,4 +13,4 @@ run(${CMAKE_COMMAND} -S ${SOURCE_DIR} -B ${WORK_DIR}/build -G ${GENERATOR}
   -D CMAKE_PREFIX_PATH=${WORK_DIR}/prefix -D EXPECTED_PREFIX=${WORK_DIR}/prefix -D EXPECTED_VERSION=${VERSION})
 run(${CMAKE_COMMAND} --build ${WORK_DIR}/build)
 run(${WORK_DIR}/build/consumer)
-run(${WORK_DIR}/build/consumer_of_all)
+run(${WORK_DIR}/build/consumer_of_all ${WORK_DIR}/prefix/share/softarm/config/paper_arm.yaml)

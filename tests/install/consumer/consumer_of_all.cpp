@@ -1,13 +1,24 @@
-// Links every room and the messages: a dependency that the package forgot to find shows here.
+// Calls into every room, so that whatever the installed libraries need must have been found. Its
+// argument is an installed experiment.
 #include <cstdio>
-#include <softarm/config/experiment.hpp>
+#include <softarm/actuation/pressure_allocator.hpp>
+#include <softarm/config/load.hpp>
+#include <softarm/daemon/control_pipeline.hpp>
+#include <softarm/plant/arm_plant.hpp>
+#include <softarm/transport/lcm_node.hpp>
 #include <softarm_messages/pressure_command_t.hpp>
 
-int main() {
-  const softarm::Experiment experiment;
+int main(int, char** arguments) try {
+  const softarm::Experiment experiment = softarm::load_experiment(arguments[1]);
+  softarm::ArmPlant plant(experiment.plant);
+  plant.advance(0.01);
+  softarm::LcmNode node("memq://");
   softarm_messages::pressure_command_t command;
   command.num_chambers = 0;
-  std::printf("%g Hz, a message of %d bytes\n", experiment.daemon.rate_hz,
+  std::printf("%s: %d chambers, %d bytes in a message\n", experiment.name.c_str(), plant.chambers(),
               command.getEncodedSize());
-  return command.getEncodedSize() > 0 ? 0 : 1;
+  return plant.chambers() > 0 ? 0 : 1;
+} catch (const std::exception& error) {
+  std::fprintf(stderr, "%s\n", error.what());
+  return 1;
 }
