@@ -174,7 +174,8 @@ class Importer {
       const double gap_s = time_s(row) - time_s(frame_row_);
       summary_.longest_gap_s = std::max(summary_.longest_gap_s, gap_s);
       if (map_.frame_period_s) {
-        steps = std::max<std::int64_t>(1, std::llround(std::floor(gap_s / *map_.frame_period_s)));
+        steps = std::max<std::int64_t>(
+            1, std::llround(std::floor(gap_s / *map_.frame_period_s + 1e-6)));
       }
     }
     summary_.missing += steps - 1;

@@ -1,0 +1,86 @@
+// Runs `softarm import` as a user would and reads its log back.
+#pragma once
+
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <lcm/lcm-cpp.hpp>
+#include <softarm_messages/mocap_frame_t.hpp>
+#include <softarm_messages/pressure_command_t.hpp>
+#include <softarm_messages/pressure_measurement_t.hpp>
+#include <string>
+#include <vector>
+
+namespace softarm::test {
+
+struct Outcome {
+  int code = -1;
+  std::string text;  ///< standard output and standard error
+};
+
+inline Outcome run(const std::string& arguments) {
+  const std::string command = SOFTARM_BINARY_DIR "/bin/softarm " + arguments + " 2>&1";
+  Outcome outcome;
+  FILE* pipe = popen(command.c_str(), "r");
+  if (pipe == nullptr) return outcome;
+  std::array<char, 4096> buffer;
+  while (std::size_t count = fread(buffer.data(), 1, buffer.size(), pipe)) {
+    outcome.text.append(buffer.data(), count);
+  }
+  const int status = pclose(pipe);
+  outcome.code = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  return outcome;
+}
+
+/// One event of a channel.
+template <class Message>
+struct Event {
+  std::int64_t time_us;
+  Message message;
+};
+
+template <class Message>
+std::vector<Event<Message>> read_log(const std::string& file, const std::string& channel) {
+  std::vector<Event<Message>> events;
+  lcm::LogFile log(file, "r");
+  if (!log.good()) return events;
+  while (const lcm::LogEvent* event = log.readNextEvent()) {
+    if (event->channel != channel) continue;
+    Message message;
+    if (message.decode(event->data, 0, event->datalen) != event->datalen) {
+      ADD_FAILURE() << "an event of " << channel << " does not decode";
+    }
+    events.push_back({event->timestamp, message});
+  }
+  return events;
+}
+
+/// A folder of its own, gone afterwards.
+class ImportTest : public testing::Test {
+ protected:
+  ImportTest() {
+    std::string pattern =
+        (std::filesystem::temp_directory_path() / "softarm_import_XXXXXX").string();
+    folder_ = mkdtemp(pattern.data());
+  }
+  ~ImportTest() override { std::filesystem::remove_all(folder_); }
+
+  std::string path(const std::string& name) const { return (folder_ / name).string(); }
+  std::string write(const std::string& name, const std::string& text) const {
+    std::ofstream(path(name)) << text;
+    return path(name);
+  }
+  Outcome import(const std::string& csv, const std::string& map) const {
+    return run("import '" + csv + "' '" + map + "' --out '" + path("log") + "'");
+  }
+
+  std::filesystem::path folder_;
+};
+
+}  // namespace softarm::test
