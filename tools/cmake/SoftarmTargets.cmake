@@ -1,6 +1,7 @@
 # softarm_room(NAME sources... [DEPENDS rooms/libraries] [PRIVATE_DEPENDS libraries]): one library a room of the house, so
 # that the linker enforces which way the arrows point. softarm_program(NAME sources... DEPENDS ...): one executable.
-# softarm_tests(LABEL ROOM DEPENDS ...): one test program from every *_test.cpp in the folder ROOM.
+# softarm_tests(LABEL ROOM [ALONE] DEPENDS ...): one test program from every *_test.cpp in the folder ROOM; ALONE for tests
+# in real time, which nothing may run beside.
 
 add_library(softarm_options INTERFACE)
 target_compile_features(softarm_options INTERFACE cxx_std_20)
@@ -38,7 +39,7 @@ function(softarm_program name)
 endfunction()
 
 function(softarm_tests label room)
-  cmake_parse_arguments(TESTS "" "" "DEPENDS" ${ARGN})
+  cmake_parse_arguments(TESTS "ALONE" "" "DEPENDS" ${ARGN})
   file(GLOB sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/${room}/*_test.cpp)
   if(NOT sources)
     return()
@@ -50,5 +51,5 @@ function(softarm_tests label room)
   target_compile_definitions(${target} PRIVATE
     SOFTARM_SOURCE_DIR="${PROJECT_SOURCE_DIR}" SOFTARM_BINARY_DIR="${PROJECT_BINARY_DIR}")
   gtest_discover_tests(${target} TEST_PREFIX "${label}.${room}." PROPERTIES LABELS ${label} TIMEOUT 300
-    DISCOVERY_TIMEOUT 60)
+    RUN_SERIAL ${TESTS_ALONE} DISCOVERY_TIMEOUT 60)
 endfunction()

@@ -1,6 +1,7 @@
 """The figures of a run. Every function takes the log and the folder, and returns (file name, caption) or None."""
 import numpy as np
 from matplotlib.lines import Line2D
+from matplotlib.ticker import FuncFormatter, LogLocator
 
 from .run_log import wrapped
 from .style import CATEGORY, COMPONENT, ESTIMATE, INK, REFERENCE, at_least, finish, plt, thinned, time_axes
@@ -271,6 +272,10 @@ def tick_times(log, directory):
                  color=CATEGORY[0], edgecolor="white", linewidth=0.6)
         axes.set_xscale("log")
         axes.set_yscale("log")
+        decades = np.log10(edges[last] / edges[first])
+        axes.xaxis.set_major_locator(LogLocator(subs=(1,) if decades > 2.5 else (1, 2, 5)))
+        axes.xaxis.set_major_formatter(FuncFormatter(lambda us, _: _duration(us)))
+        axes.minorticks_off()
         axes.set_ylim(bottom=0.6)
         known = log.timing.get(name, {})
         for q, key, colour in ((0.5, "p50", CATEGORY[2]), (0.99, "p99", CATEGORY[1])):
@@ -278,12 +283,12 @@ def tick_times(log, directory):
             axes.axvline(value, color=colour, linewidth=1.2)
             axes.text(value, 0.985, f" {key} {_duration(value)}", color=colour, fontsize=8, va="top",
                       transform=axes.get_xaxis_transform(), ha="left" if q > 0.9 else "right")
-        axes.set_xlabel("duration [µs]")
+        axes.set_xlabel("duration")
         axes.set_ylabel("count")
         largest = f", largest {_duration(known['max'])}" if "max" in known else ""
         axes.set_title(HISTOGRAM_TITLES.get(name, name) + largest)
         axes.set_ylim(top=axes.get_ylim()[1] * 3)
-    finish(figure, directory / "tick_times.png", "Where a tick's time goes")
+    finish(figure, directory / "tick_times.png", "Where a tick's time goes", row_gap=0.8)
     return "tick_times.png", "Histograms since start; both axes are logarithmic."
 
 
@@ -317,7 +322,7 @@ def residuals(log, directory):
     lane.set_yticks([])
     lane.set_ylabel("saturated", rotation=0, ha="right", va="center")
     handles = [Line2D([], [], color=_segment_colour(i), label=f"segment {i + 1}") for i in range(min(log.segments, 8))]
-    finish(figure, directory / "residuals.png", "Residuals and frames", handles + modes)
+    finish(figure, directory / "residuals.png", "Residuals and frames", handles + modes, left_margin=0.85)
     return "residuals.png", ("Rotation about the axis that a segment of constant curvature does not have, measured minus "
                              "expected chord, age of the newest frame at the tick, and when a limit cut the command.")
 
