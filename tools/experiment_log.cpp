@@ -8,6 +8,7 @@
 #include <numbers>
 #include <stdexcept>
 
+#include "json_writer.hpp"
 #include "program.hpp"
 
 namespace softarm {
@@ -17,17 +18,6 @@ constexpr double kThetaForPhi = 0.05;  ///< rad; phi means little below
 
 double angle_difference(double a, double b) {
   return std::remainder(a - b, 2.0 * std::numbers::pi);
-}
-
-std::string number(double value) {
-  return std::isfinite(value) ? fmt::format("{:.9g}", value) : "null";
-}
-
-template <class Range>
-std::string list(const Range& values) {
-  std::string text = "[";
-  for (const double value : values) text += (text.size() > 1 ? ", " : "") + number(value);
-  return text + "]";
 }
 
 }  // namespace
@@ -48,6 +38,9 @@ void TrackingSummary::add(const LogRow& row, double period_s) {
   if (ticks_++ == 0) first_t_s_ = row.t_s;
   last_t_s_ = row.t_s + period_s;
   mode_s_[static_cast<std::size_t>(row.mode)] += period_s;
+  const bool changed = transitions_.empty() || transitions_.back().mode != row.mode;
+  if (changed && transitions_.size() < kMaxTransitions)
+    transitions_.push_back({row.t_s, row.mode, row.reason});
   if (row.commanded.size() > 0)
     pressure_max_bar_ = std::max(pressure_max_bar_, row.commanded.maxCoeff());
   if (row.mode != Mode::active) {
@@ -83,10 +76,46 @@ void TrackingSummary::add_tracking(const LogRow& row) {
 }
 
 std::string TrackingSummary::json() const {
-  std::vector<double> u_segments, theta, phi;
-  for (const auto& each : u_of_segment_) u_segments.push_back(each.rms());
-  for (const auto& each : theta_) theta.push_back(each.rms());
-  for (const auto& each : phi_) phi.push_back(each.rms());
+  JsonWriter json;
+  json.open_object();
+  json.member("duration_s", duration_s());
+  json.member("ticks", ticks_);
+  json.key("tracking");
+  write_tracking(json);
+  json.key("pressure_bar");
+  json.open_object();
+  json.member("max", pressure_max_bar_);
+  json.close_object();
+  json.member("saturated_fraction", active_ticks_ > 0 ? static_cast<double>(saturated_ticks_) /
+                                                            static_cast<double>(active_ticks_)
+                                                      : 0.0);
+  json.key("modes");
+  json.open_object();
+  for (std::size_t k = 0; k < mode_s_.size(); ++k)
+    if (mode_s_[k] > 0.0) json.member(name(static_cast<Mode>(k)), mode_s_[k]);
+  json.close_object();
+  json.key("transitions");
+  json.open_array();
+  for (const Transition& transition : transitions_) {
+    json.open_object();
+    json.member("t_s", transition.t_s);
+    json.member("mode", name(transition.mode));
+    json.member("reason", name(transition.reason));
+    json.close_object();
+  }
+  json.close_array();
+  if (frames_) write_frames(json);
+  json.close_object();
+  return json.text() + "\n";
+}
+
+void TrackingSummary::write_tracking(JsonWriter& json) const {
+  const auto list = [&json](const char* key, const std::vector<MeanSquare>& values) {
+    json.key(key);
+    json.open_array();
+    for (const MeanSquare& each : values) json.value(each.rms());
+    json.close_array();
+  };
   const double half_s = 0.5 * (first_t_s_ + last_t_s_);
   MeanSquare tip, tip_second_half;
   for (const auto& [t_s, squared] : tip_squared_) {
@@ -96,25 +125,26 @@ std::string TrackingSummary::json() const {
     tip_second_half.sum += squared;
     ++tip_second_half.count;
   }
-  std::string modes;
-  for (std::size_t k = 0; k < mode_s_.size(); ++k)
-    if (mode_s_[k] > 0.0)
-      modes += fmt::format("{}\"{}\": {}", modes.empty() ? "" : ", ", name(static_cast<Mode>(k)),
-                           number(mode_s_[k]));
-  const double saturated =
-      active_ticks_ > 0 ? static_cast<double>(saturated_ticks_) / static_cast<double>(active_ticks_)
-                        : 0.0;
-  return fmt::format(
-      "{{\n  \"duration_s\": {},\n  \"ticks\": {},\n  \"tracking\": {{\n    \"u_rms_rad\": {},\n   "
-      " \"u_max_rad\": {},\n"
-      "    \"u_rms_segment_rad\": {},\n    \"theta_rms_rad\": {},\n    \"phi_rms_rad\": {},\n    "
-      "\"tip_rms_m\": {},\n"
-      "    \"tip_rms_second_half_m\": {}\n  }},\n  \"pressure_bar\": {{\"max\": {}}},\n  "
-      "\"saturated_fraction\": {},\n"
-      "  \"modes\": {{{}}}\n}}\n",
-      number(ticks_ > 0 ? last_t_s_ - first_t_s_ : 0.0), ticks_, number(u_.rms()),
-      number(u_max_rad_), list(u_segments), list(theta), list(phi), number(tip.rms()),
-      number(tip_second_half.rms()), number(pressure_max_bar_), number(saturated), modes);
+  json.open_object();
+  json.member("u_rms_rad", u_.rms());
+  json.member("u_max_rad", u_max_rad_);
+  list("u_rms_segment_rad", u_of_segment_);
+  list("theta_rms_rad", theta_);
+  list("phi_rms_rad", phi_);
+  json.member("tip_rms_m", tip.rms());
+  json.member("tip_rms_second_half_m", tip_second_half.rms());
+  json.close_object();
+}
+
+void TrackingSummary::write_frames(JsonWriter& json) const {
+  json.key("frames");
+  json.open_object();
+  json.member("accepted", frames_->accepted);
+  json.member("rejected", frames_->rejected());
+  json.member("repeated", frames_->repeated);
+  json.member("missing", frames_->missing);
+  json.member("late", late_frames_);
+  json.close_object();
 }
 
 std::string TrackingSummary::table() const {
@@ -212,22 +242,35 @@ void ExperimentLog::close() {
 }
 
 std::string timing_json(const TimingReport& report) {
-  std::string text =
-      fmt::format("{{\n  \"real_time_factor\": {},\n", number(report.real_time_factor));
-  std::string histograms;
+  JsonWriter json;
+  json.open_object();
+  json.member("real_time_factor", report.real_time_factor);
   for (const auto& each : report.histograms) {
-    std::string counts, edges;
-    for (int k = 0; k < kDurationBuckets; ++k) {
-      counts += fmt::format("{}{}", k > 0 ? ", " : "", each.counts[static_cast<std::size_t>(k)]);
-      edges += fmt::format("{}{:.6g}", k > 0 ? ", " : "", bucket_edge_us(k));
-    }
-    text += fmt::format("  \"{}\": {{\"p50\": {}, \"p99\": {}, \"max\": {}}},\n", each.name,
-                        number(quantile_us(each.counts, 0.5)),
-                        number(quantile_us(each.counts, 0.99)), number(each.max_us));
-    histograms += fmt::format("{}    \"{}\": {{\"edges_us\": [{}], \"counts\": [{}]}}",
-                              histograms.empty() ? "" : ",\n", each.name, edges, counts);
+    json.key(each.name);
+    json.open_object();
+    json.member("p50", quantile_us(each.counts, 0.5));
+    json.member("p99", quantile_us(each.counts, 0.99));
+    json.member("max", each.max_us);
+    json.close_object();
   }
-  return text + "  \"histograms\": {\n" + histograms + "\n  }\n}\n";
+  json.key("histograms");
+  json.open_object();
+  for (const auto& each : report.histograms) {
+    json.key(each.name);
+    json.open_object();
+    json.key("edges_us");
+    json.open_array();
+    for (int k = 0; k < kDurationBuckets; ++k) json.value(bucket_edge_us(k));
+    json.close_array();
+    json.key("counts");
+    json.open_array();
+    for (const std::int32_t count : each.counts) json.value(count);
+    json.close_array();
+    json.close_object();
+  }
+  json.close_object();
+  json.close_object();
+  return json.text() + "\n";
 }
 
 void write_text(const std::filesystem::path& path, const std::string& text) {

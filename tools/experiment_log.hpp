@@ -15,8 +15,11 @@
 #include "softarm/config/experiment.hpp"
 #include "softarm/daemon/histogram.hpp"
 #include "softarm/daemon/safety_monitor.hpp"
+#include "softarm/estimation/frame_validator.hpp"
 
 namespace softarm {
+
+class JsonWriter;
 
 /// One tick. Vectors may be left empty where a quantity is not known; its cells stay empty.
 struct LogRow {
@@ -40,8 +43,25 @@ class TrackingSummary {
 
   void add(const LogRow& row, double period_s);
 
-  /// As JSON; byte-identical for identical rows. `duration_s` splits the tip error into halves.
+  /// Tells what became of the frames; without it the summary does not speak of them.
+  void set_frames(const FrameCounters& frames, std::int64_t late) {
+    frames_ = frames;
+    late_frames_ = late;
+  }
+
+  double duration_s() const { return ticks_ > 0 ? last_t_s_ - first_t_s_ : 0.0; }
+
+  /// As JSON; byte-identical for identical rows.
   std::string json() const;
+
+  /// Every change of mode, in order; at most kMaxTransitions of them.
+  struct Transition {
+    double t_s;
+    Mode mode;
+    Reason reason;
+  };
+  static constexpr std::size_t kMaxTransitions = 10'000;
+  const std::vector<Transition>& transitions() const { return transitions_; }
 
   /// A table for people.
   std::string table() const;
@@ -57,6 +77,8 @@ class TrackingSummary {
     double rms() const;  ///< NaN when empty
   };
   void add_tracking(const LogRow& row);
+  void write_tracking(JsonWriter& json) const;
+  void write_frames(JsonWriter& json) const;
 
   int segments_;
   double tracking_from_s_;
@@ -72,6 +94,9 @@ class TrackingSummary {
   std::vector<std::pair<double, double>> tip_squared_;  ///< time and squared error, for the halves
   double pressure_max_bar_ = 0.0;
   std::array<double, 6> mode_s_{};
+  std::vector<Transition> transitions_;
+  std::optional<FrameCounters> frames_;
+  std::int64_t late_frames_ = 0;
 };
 
 /// Writes DIR/log.csv.

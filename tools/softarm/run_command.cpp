@@ -1,20 +1,22 @@
 // softarm run: the daemon's pipeline and the simulated arm in one process, in lock step, as fast as
 // the machine allows.
 #include <fmt/format.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <cmath>
+#include <filesystem>
 #include <memory>
-#include <vector>
 
 #include "experiment_log.hpp"
+#include "lock_step.hpp"
+#include "logged_run.hpp"
 #include "program.hpp"
 #include "progress.hpp"
 #include "softarm/commands.hpp"
 #include "softarm/config/load.hpp"
-#include "softarm/daemon/control_pipeline.hpp"
 #include "softarm/daemon/realtime.hpp"
-#include "softarm/model/kinematics.hpp"
-#include "softarm/plant/simulated_arm.hpp"
 
 namespace softarm {
 namespace {
@@ -22,116 +24,90 @@ namespace {
 struct RunOptions {
   std::string config;
   std::string out = "out";
+  std::string mocap_log;
+  bool plots = true;
   double duration_s = 0.0;
   std::uint64_t seed = 0;
   bool has_seed = false;
 };
 
-/// Pipeline and plant in lock step: ticks at whole periods, everything else at its own time between
-/// them.
-class LockStep {
- public:
-  explicit LockStep(const Experiment& experiment)
-      : experiment_(experiment), pipeline_(experiment), arm_(experiment.plant, 0) {}
-
-  /// One tick at the next period; leaves the plant, and the row, in the middle of the period: there
-  /// the reference of that tick belongs.
-  void step(LogRow& row) {
-    const std::int64_t now_ns = ticks_++ * pipeline_.period_ns();
-    arm_.advance_to(now_ns);
-    frames_.clear();
-    for (MocapFrame frame; arm_.receive(frame);) frames_.push_back(frame);
-
+/// Steps whatever makes the rows to its end, or to `duration_s`; returns the wall time it took, in
+/// ns.
+template <class Stepper>
+std::int64_t record(Stepper& stepper, double duration_s, double period_s, ExperimentLog& log,
+                    TrackingSummary& summary) {
+  Progress progress;
+  LogRow row;
+  std::int64_t stepping_ns = 0;
+  const auto ticks = static_cast<std::int64_t>(std::llround(duration_s / period_s));
+  for (std::int64_t k = 0; k < ticks; ++k) {
     const std::int64_t before_ns = monotonic_now_ns();
-    TickInput input;
-    input.now_ns = now_ns;
-    input.frames = frames_;
-    const TickOutput& output = pipeline_.tick(input);
-    tick_.add_ns(monotonic_now_ns() - before_ns);
-
-    pressures_.assign(output.pressure_bar.begin(), output.pressure_bar.end());
-    arm_.command({.sequence = ticks_,
-                  .validity_ns = std::llround(1e9 * experiment_.daemon.lcm.command_validity_s),
-                  .shadow = false,
-                  .pressure_bar = pressures_},
-                 now_ns);
-    arm_.advance_to(now_ns + pipeline_.period_ns() / 2);
-    fill(row);
+    if (!stepper.step(row)) break;
+    stepping_ns += monotonic_now_ns() - before_ns;
+    log.add(row);
+    summary.add(row, period_s);
+    if (progress.due())
+      progress.update(fmt::format("{:.1f} of {:.1f} s, {}", row.t_s, duration_s, name(row.mode)));
   }
+  const ControlPipeline& pipeline = stepper.pipeline();
+  summary.set_frames(pipeline.counters(), pipeline.late_frames());
+  return stepping_ns;
+}
 
-  const ControlPipeline& pipeline() const { return pipeline_; }
-  const DurationHistogram& tick_times() const { return tick_; }
+/// The plotting script: beside an installed program, else in the source tree this was built from.
+std::filesystem::path plot_script() {
+  std::error_code error;
+  const auto installed =
+      std::filesystem::read_symlink("/proc/self/exe", error).parent_path().parent_path() / "share" /
+      "softarm" / "plot_run.py";
+  return std::filesystem::exists(installed, error) ? installed
+                                                   : std::filesystem::path(SOFTARM_PLOT_SCRIPT);
+}
 
- private:
-  void fill(LogRow& row) {
-    const TickOutput& output = pipeline_.output();
-    const CurvatureEstimate& estimate = pipeline_.estimate();
-    const int n = experiment_.arm.size();
-    row.t_s = 1e-9 * static_cast<double>(arm_.time_ns());
-    row.mode = output.mode;
-    row.reason = output.reason;
-    row.saturated = output.saturated;
-    row.frame_age_s = output.frame_age_s;
-    row.u = output.motion.u_rad;
-    row.velocity = output.motion.velocity_radps;
-    row.reference = output.reference.u;
-    row.truth = arm_.plant().u_rad();
-    row.tau_actuation = output.tau_actuation_nm;
-    row.residual_twist = Eigen::Map<const Eigen::VectorXd>(estimate.twist_rad.data(), n);
-    row.residual_length = Eigen::Map<const Eigen::VectorXd>(estimate.length_error_m.data(), n);
-    row.commanded = output.pressure_bar;
-    row.real = arm_.measured_pressures_bar();
-    row.tip = arm_.plant().tip_m();
-    row.tip_reference.reset();
-    if (row.reference.size() > 0) row.tip_reference = tip_position(experiment_.arm, row.reference);
-  }
-
-  const Experiment& experiment_;
-  ControlPipeline pipeline_;
-  SimulatedArm arm_;
-  std::vector<MocapFrame> frames_;
-  std::vector<double> pressures_;
-  std::int64_t ticks_ = 0;
-  DurationHistogram tick_;
-};
+/// A run without plots is still a run: what is missing is said, not thrown.
+void plot(const std::string& out) {
+  const std::string script = plot_script().string();
+  char* const arguments[] = {const_cast<char*>("/usr/bin/python3"),
+                             const_cast<char*>(script.c_str()), const_cast<char*>(out.c_str()),
+                             nullptr};
+  pid_t child = 0;
+  int status = 0;
+  const bool drawn = posix_spawn(&child, arguments[0], nullptr, nullptr, arguments, environ) == 0 &&
+                     waitpid(child, &status, 0) == child && status == 0;
+  if (!drawn)
+    print_error("softarm",
+                "no plots: is python3-matplotlib installed? Use --no-plots to do without");
+}
 
 int run(const RunOptions& options) {
   Experiment experiment = load_experiment(options.config);
   if (options.has_seed) experiment.seed = experiment.plant.seed = options.seed;
   const double duration_s =
       options.duration_s > 0.0 ? options.duration_s : experiment.run.duration_s;
-
-  auto lock_step = std::make_unique<LockStep>(experiment);
-  ExperimentLog log(options.out, experiment);
-  TrackingSummary summary(experiment.arm.size(), experiment.run.tracking_from_s);
   const double period_s = 1.0 / experiment.daemon.rate_hz;
-  const auto ticks = static_cast<std::int64_t>(std::llround(duration_s / period_s));
-  LogRow row;
-  std::int64_t simulation_ns = 0;
-  {
-    Progress progress;
-    for (std::int64_t k = 0; k < ticks; ++k) {
-      const std::int64_t before_ns = monotonic_now_ns();
-      lock_step->step(row);
-      simulation_ns += monotonic_now_ns() - before_ns;
-      log.add(row);
-      summary.add(row, period_s);
-      if (progress.due())
-        progress.update(
-            fmt::format("{:.1f} of {:.1f} s simulated, {}", row.t_s, duration_s, name(row.mode)));
-    }
+
+  TrackingSummary summary(experiment.arm.size(), experiment.run.tracking_from_s);
+  TimingReport timing;
+  const auto record_and_report = [&](auto stepper) {
+    ExperimentLog log(options.out, experiment);
+    const std::int64_t took_ns = record(*stepper, duration_s, period_s, log, summary);
+    log.close();
+    timing.real_time_factor =
+        1e9 * summary.duration_s() / static_cast<double>(std::max<std::int64_t>(1, took_ns));
+    timing.histograms = {
+        {"tick_us", stepper->tick_times().counts(), stepper->tick_times().max_us()}};
+  };
+  if (options.mocap_log.empty()) {
+    record_and_report(std::make_unique<LockStep>(experiment));
+  } else {
+    record_and_report(std::make_unique<LoggedRun>(experiment, options.mocap_log));
   }
-  log.close();
   const std::filesystem::path out(options.out);
   write_text(out / "summary.json", summary.json());
-  const double factor =
-      1e9 * duration_s / static_cast<double>(std::max<std::int64_t>(1, simulation_ns));
-  const DurationHistogram& tick = lock_step->tick_times();
-  write_text(out / "timing.json",
-             timing_json({.real_time_factor = factor,
-                          .histograms = {{"tick_us", tick.counts(), tick.max_us()}}}));
+  write_text(out / "timing.json", timing_json(timing));
   fmt::print("{}{:.0f} times faster than real time; log, summary and timing are in {}\n",
-             summary.table(), factor, options.out);
+             summary.table(), timing.real_time_factor, options.out);
+  if (options.plots) plot(options.out);
   return kExitOk;
 }
 
@@ -149,6 +125,9 @@ void add_run_command(CLI::App& app) {
       ->add_option("--duration", options->duration_s,
                    "simulated time in s (default: run.duration_s)")
       ->check(CLI::PositiveNumber);
+  command->add_option("--mocap", options->mocap_log,
+                      "take the frames from this LCM log instead of the simulated arm");
+  command->add_flag("!--no-plots", options->plots, "do not draw the plots");
   auto* seed = command->add_option("--seed", options->seed,
                                    "seed of noise and dropouts (default: the configuration's)");
   command->callback([options, seed] {

@@ -67,11 +67,11 @@ class ImportTest : public testing::Test {
   ImportTest() {
     std::string pattern =
         (std::filesystem::temp_directory_path() / "softarm_import_XXXXXX").string();
-    folder_ = mkdtemp(pattern.data());
+    folder = mkdtemp(pattern.data());
   }
-  ~ImportTest() override { std::filesystem::remove_all(folder_); }
+  ~ImportTest() override { std::filesystem::remove_all(folder); }
 
-  std::string path(const std::string& name) const { return (folder_ / name).string(); }
+  std::string path(const std::string& name) const { return (folder / name).string(); }
   std::string write(const std::string& name, const std::string& text) const {
     std::ofstream(path(name)) << text;
     return path(name);
@@ -80,7 +80,7 @@ class ImportTest : public testing::Test {
     return run("import '" + csv + "' '" + map + "' --out '" + path("log") + "'");
   }
 
-  std::filesystem::path folder_;
+  std::filesystem::path folder;
 };
 
 }  // namespace softarm::test

@@ -79,15 +79,15 @@ double angle(const Eigen::Vector4d& a, const Eigen::Vector4d& b) {
 class Recorded : public softarm::test::ImportTest, public testing::WithParamInterface<Recording> {
  protected:
   void SetUp() override {
-    table_ = std::string(SOFTARM_SOURCE_DIR "/../shared/data/") + GetParam().table;
-    if (!std::filesystem::exists(table_)) {
+    csv = std::string(SOFTARM_SOURCE_DIR "/../shared/data/") + GetParam().table;
+    if (!std::filesystem::exists(csv)) {
       GTEST_SKIP() << GetParam().table
                    << " is not there: the recordings are not part of the project";
     }
     const auto outcome =
-        import(table_, std::string(SOFTARM_SOURCE_DIR "/config/recordings/") + GetParam().map);
+        import(csv, std::string(SOFTARM_SOURCE_DIR "/config/recordings/") + GetParam().map);
     ASSERT_EQ(outcome.code, 0) << outcome.text;
-    frames_ = read_log<mocap_frame_t>(path("log"), "SOFTARM_MOCAP");
+    frames = read_log<mocap_frame_t>(path("log"), "SOFTARM_MOCAP");
   }
 
   /// u of every accepted frame, by the room that the daemon uses.
@@ -105,7 +105,7 @@ class Recorded : public softarm::test::ImportTest, public testing::WithParamInte
     settings.orientation_noise_rad = 5e-4;
     softarm::FrameValidator validator(settings, arm, softarm::body_noise(settings, 1, false));
     std::vector<Sample> samples;
-    for (const auto& [time_us, message] : frames_) {
+    for (const auto& [time_us, message] : frames) {
       softarm::MocapFrame frame;
       frame.frame_number = message.frame_number;
       frame.capture_ns = 1000 * message.capture_time_us;
@@ -122,23 +122,23 @@ class Recorded : public softarm::test::ImportTest, public testing::WithParamInte
       samples.push_back({1e-6 * static_cast<double>(time_us), estimate.u_rad, estimate.twist_rad[0],
                          estimate.length_error_m[0]});
     }
-    counters_ = validator.counters();
+    counters = validator.counters();
     return samples;
   }
 
-  std::string table_;
-  std::vector<softarm::test::Event<mocap_frame_t>> frames_;
-  softarm::FrameCounters counters_;
+  std::string csv;
+  std::vector<softarm::test::Event<mocap_frame_t>> frames;
+  softarm::FrameCounters counters;
 };
 
 TEST_P(Recorded, EveryRowIsThereAndRepeatedRowsAreRepeatedFrames) {
-  const Text text(table_);
+  const Text text(csv);
   ASSERT_EQ(text.rows(), GetParam().rows);
-  ASSERT_EQ(frames_.size(), text.rows());
+  ASSERT_EQ(frames.size(), text.rows());
   std::size_t repeated = 0;
   for (std::size_t k = 0; k < text.rows(); ++k) {
-    EXPECT_NEAR(static_cast<double>(frames_[k].time_us), 1e6 * text.number(k, "time"), 0.51);
-    const auto& message = frames_[k].message;
+    EXPECT_NEAR(static_cast<double>(frames[k].time_us), 1e6 * text.number(k, "time"), 0.51);
+    const auto& message = frames[k].message;
     ASSERT_EQ(message.num_bodies, 2);
     for (int body : {2, 3}) {
       const bool zero = text.position(k, body).isZero(0.0) && text.orientation(k, body).isZero(0.0);
@@ -148,7 +148,7 @@ TEST_P(Recorded, EveryRowIsThereAndRepeatedRowsAreRepeatedFrames) {
     if (k == 0) continue;
     const bool same =
         text.pose(k, 2) == text.pose(k - 1, 2) && text.pose(k, 3) == text.pose(k - 1, 3);
-    const auto& before = frames_[k - 1].message;
+    const auto& before = frames[k - 1].message;
     EXPECT_EQ(message.frame_number == before.frame_number, same) << "row " << k;
     EXPECT_GE(message.frame_number, before.frame_number);
     if (same) {
@@ -163,12 +163,12 @@ TEST_P(Recorded, EveryRowIsThereAndRepeatedRowsAreRepeatedFrames) {
 // What no choice of frames can change: how far and by how much each body has moved since an instant
 // of reference.
 TEST_P(Recorded, BodiesMoveAsInTheTable) {
-  const Text text(table_);
+  const Text text(csv);
   const std::size_t start = 5;
   for (std::size_t k = start; k < text.rows(); k += 7) {
     for (std::size_t i = 0; i < 2; ++i) {
-      const auto& from = frames_[start].message.bodies[i];
-      const auto& to = frames_[k].message.bodies[i];
+      const auto& from = frames[start].message.bodies[i];
+      const auto& to = frames[k].message.bodies[i];
       const int body = static_cast<int>(i) + 2;
       const double turned = angle(text.orientation(start, body), text.orientation(k, body));
       EXPECT_NEAR(angle(Eigen::Vector4d(from.orientation), Eigen::Vector4d(to.orientation)), turned,
@@ -184,11 +184,11 @@ TEST_P(Recorded, BodiesMoveAsInTheTable) {
 }
 
 TEST_P(Recorded, TheArmHangsStraightBelowTheTopPlateAtRest) {
-  const Text text(table_);
+  const Text text(csv);
   for (std::size_t k = 0; k < text.rows() && text.number(k, "time") < 0.5; ++k) {
-    if (!frames_[k].message.bodies[0].valid) continue;
-    const Eigen::Vector3d top(frames_[k].message.bodies[0].position_m);
-    const Eigen::Vector3d tip(frames_[k].message.bodies[1].position_m);
+    if (!frames[k].message.bodies[0].valid) continue;
+    const Eigen::Vector3d top(frames[k].message.bodies[0].position_m);
+    const Eigen::Vector3d tip(frames[k].message.bodies[1].position_m);
     const Eigen::Vector3d raw = text.position(k, 2);
     EXPECT_LT((top - Eigen::Vector3d(raw.x(), -raw.z(), raw.y())).norm(), 0.1e-3);
     EXPECT_LT((top - tip - Eigen::Vector3d(0, 0, 0.33)).norm(), 0.4e-3) << "row " << k;
@@ -197,9 +197,9 @@ TEST_P(Recorded, TheArmHangsStraightBelowTheTopPlateAtRest) {
 
 TEST_P(Recorded, TheEstimatorMakesASmoothBendOfIt) {
   const auto samples = estimates();
-  EXPECT_EQ(counters_.accepted + counters_.not_seen,
-            static_cast<std::int64_t>(frames_.size()) - counters_.repeated);
-  EXPECT_EQ(counters_.rejected(), counters_.not_seen);
+  EXPECT_EQ(counters.accepted + counters.not_seen,
+            static_cast<std::int64_t>(frames.size()) - counters.repeated);
+  EXPECT_EQ(counters.rejected(), counters.not_seen);
   for (std::size_t k = 0; k < samples.size(); ++k) {
     const Sample& s = samples[k];
     if (s.t < 0.45) {

@@ -1,0 +1,197 @@
+// The whole pipeline against the simulated arm, in lock step: how well it tracks, and where it must
+// not stumble.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <functional>
+#include <numbers>
+
+#include "lock_step.hpp"
+#include "softarm/config/load.hpp"
+
+namespace softarm {
+namespace {
+
+using std::numbers::pi;
+
+Experiment configured(const char* name) {
+  return load_experiment(std::filesystem::path(SOFTARM_SOURCE_DIR) / "config" / name);
+}
+
+/// Largest and mean square of reference minus truth, per component, from `from_s` after the first
+/// ACTIVE on.
+struct Tracking {
+  double rms_rad = 0.0;
+  double max_rad = 0.0;
+  double largest_theta_rad = 0.0;
+  double smallest_theta_rad = 1e300;
+  double active_s = 0.0;
+  std::int64_t counted = 0;
+};
+
+Tracking track(const Experiment& experiment, double duration_s, double from_s,
+               const std::function<void(const LogRow&)>& look = {}) {
+  LockStep lock_step(experiment);
+  LogRow row;
+  Tracking result;
+  const double period_s = 1.0 / experiment.daemon.rate_hz;
+  for (double t_s = 0.0; t_s < duration_s; t_s += period_s) {
+    lock_step.step(row);
+    if (look) look(row);
+    if (row.mode != Mode::active) continue;
+    result.active_s += period_s;
+    if (result.active_s < from_s) continue;
+    const SegmentVector error = row.reference - row.truth;
+    result.rms_rad += error.squaredNorm();
+    result.counted += error.size();
+    result.max_rad = std::max(result.max_rad, error.cwiseAbs().maxCoeff());
+    for (int i = 0; i < experiment.arm.size(); ++i) {
+      const double theta_rad = row.truth.segment<2>(2 * i).norm();
+      result.largest_theta_rad = std::max(result.largest_theta_rad, theta_rad);
+      result.smallest_theta_rad = std::min(result.smallest_theta_rad, theta_rad);
+    }
+  }
+  result.rms_rad = std::sqrt(result.rms_rad / static_cast<double>(result.counted));
+  return result;
+}
+
+/// Every segment through the same points, `lap_s` from one to the next.
+ReferenceSettings through(int segments, const std::vector<Eigen::Vector2d>& points, double lap_s) {
+  WayPointReference reference;
+  for (std::size_t k = 0; k < points.size(); ++k) {
+    WayPoint point{.time_s = lap_s * static_cast<double>(k + 1), .u_rad = {}};
+    for (int i = 0; i < segments; ++i)
+      point.u_rad.insert(point.u_rad.end(), points[k].begin(), points[k].end());
+    reference.points.push_back(point);
+  }
+  return {.phases = {{.kind = reference, .duration_s = 0.0}}};
+}
+
+TEST(ClosedLoop, NominalArmTracksThePapersReference) {
+  EXPECT_LE(track(configured("paper_arm_nominal.yaml"), 10.0, 1.0).rms_rad, 2e-4);
+}
+
+TEST(ClosedLoop, RealisticArmTracksThePapersReference) {
+  const Tracking tracking = track(configured("paper_arm.yaml"), 20.0, 1.0);
+  EXPECT_LE(tracking.rms_rad, 6e-3);
+  EXPECT_GT(tracking.active_s, 19.0);
+}
+
+TEST(ClosedLoop, MismatchedArmTracksThePapersReference) {
+  EXPECT_LE(track(configured("paper_arm_mismatch.yaml"), 20.0, 1.0).rms_rad, 0.02);
+}
+
+TEST(ClosedLoop, PolarModeWithThePapersGainsTracksFromTenSecondsOn) {
+  EXPECT_LE(track(configured("paper_arm_polar.yaml"), 20.0, 10.0).rms_rad, 2e-4);
+}
+
+TEST(ClosedLoop, PassesThroughTheStraightPose) {
+  Experiment experiment = configured("paper_arm_nominal.yaml");
+  experiment.reference = through(3, {{0.4, 0.1}, {-0.4, -0.1}, {0.4, 0.1}}, 1.0);
+  const Tracking tracking = track(experiment, 4.0, 0.0);
+  EXPECT_LT(tracking.smallest_theta_rad, 2e-3) << "the test must come near theta = 0";
+  EXPECT_LE(tracking.max_rad, 2e-3);
+}
+
+TEST(ClosedLoop, StaysAtTheStraightPose) {
+  Experiment experiment = configured("paper_arm_nominal.yaml");
+  experiment.reference = {
+      .phases = {{.kind = SetPointReference{std::vector<double>(6, 0.0)}, .duration_s = 0.0}}};
+  EXPECT_LE(track(experiment, 2.0, 0.0).max_rad, 1e-6);
+}
+
+TEST(ClosedLoop, TurnsPhiAcrossPiBothWays) {
+  Experiment experiment = configured("paper_arm_nominal.yaml");
+  experiment.reference = through(3, {{-0.4, 0.1}, {-0.4, -0.1}, {-0.4, 0.1}}, 1.0);
+  double lowest_y = 0.0, highest_y = 0.0;
+  const Tracking tracking = track(experiment, 4.0, 1.1, [&](const LogRow& row) {
+    lowest_y = std::min(lowest_y, row.truth[1]);
+    highest_y = std::max(highest_y, row.truth[1]);
+  });
+  EXPECT_LT(lowest_y, -0.05);
+  EXPECT_GT(highest_y, 0.05);
+  EXPECT_LE(tracking.max_rad, 1e-3);
+}
+
+TEST(ClosedLoop, PolarModeTurnsPhiAcrossPi) {
+  Experiment experiment = configured("paper_arm_polar.yaml");
+  experiment.reference = through(3, {{-0.4, 0.1}, {-0.4, -0.1}, {-0.4, 0.1}}, 2.0);
+  // Without a gain on theta (23) leaves a slow mode; what matters is that nothing jumps where phi
+  // wraps.
+  EXPECT_LE(track(experiment, 8.0, 2.5).max_rad, 0.05);
+}
+
+TEST(ClosedLoop, BendsBeyondNinetyDegrees) {
+  Experiment experiment = configured("paper_arm_nominal.yaml");
+  experiment.arm.segments.resize(1);
+  experiment.plant.arm.segments.resize(1);
+  experiment.plant.initial_u_rad = SegmentVector::Zero(2);
+  experiment.actuation.segments.resize(1);
+  experiment.plant.actuation.segments.resize(1);
+  experiment.daemon.bodies.segment_ids.resize(1);
+  experiment.control.kp.resize(2);
+  experiment.control.kd.resize(2);
+  experiment.reference = through(1, {{2.0, 0.0}, {0.0, 2.0}, {-1.9, 0.5}}, 2.0);
+  const Tracking tracking = track(experiment, 7.0, 1.0);
+  EXPECT_GT(tracking.largest_theta_rad, pi / 2.0 + 0.3);
+  EXPECT_LE(tracking.max_rad, 5e-3);
+}
+
+TEST(ClosedLoop, CoupleActuationTracksBelowPi) {
+  Experiment experiment = configured("paper_arm_nominal.yaml");
+  experiment.arm.actuation = experiment.plant.arm.actuation = ActuationModel::couple;
+  EXPECT_LE(track(experiment, 5.0, 1.0).rms_rad, 2e-4);
+}
+
+TEST(ClosedLoop, EveryShippedArmTracksItsReference) {
+  // Rest of the shipped experiments: a steady state within a few milliradian says maps, signs and
+  // gains agree.
+  for (const char* name : {"one_segment.yaml", "planar_arm.yaml"}) {
+    const Tracking tracking = track(configured(name), 6.0, 4.0);
+    EXPECT_GT(tracking.active_s, 5.0) << name;
+    EXPECT_LE(tracking.rms_rad, 6e-3) << name;
+  }
+}
+
+TEST(ClosedLoop, OutOfReachIsFlaggedAndBounded) {
+  Experiment experiment = configured("paper_arm_nominal.yaml");
+  experiment.actuation.max_pressure_bar = 0.2;
+  bool saturated = false;
+  track(experiment, 3.0, 1.0, [&](const LogRow& row) {
+    saturated |= row.saturated;
+    ASSERT_LE(row.commanded.maxCoeff(), 0.2);
+    ASSERT_GE(row.commanded.minCoeff(), 0.0);
+  });
+  EXPECT_TRUE(saturated);
+}
+
+TEST(ClosedLoop, SilenceOfTheMotionCaptureHoldsThenVents) {
+  // Dropouts so frequent that HOLD must happen, rare enough that the arm comes back.
+  Experiment experiment = configured("paper_arm.yaml");
+  experiment.plant.mocap.dropout_probability = 0.3;
+  experiment.daemon.safety.good_frames = 5;
+  double hold_s = 0.0, largest_step_bar = 0.0;
+  PressureVector previous;
+  Mode mode = Mode::init;
+  const double period_s = 1.0 / experiment.daemon.rate_hz;
+  const Tracking tracking = track(experiment, 10.0, 0.0, [&](const LogRow& row) {
+    if (row.mode == Mode::hold) {
+      hold_s += period_s;
+      if (mode == Mode::hold) {
+        EXPECT_EQ(row.commanded, previous) << "HOLD freezes the pressures";
+      }
+    }
+    if (previous.size() > 0)
+      largest_step_bar =
+          std::max(largest_step_bar, (row.commanded - previous).cwiseAbs().maxCoeff());
+    previous = row.commanded;
+    mode = row.mode;
+  });
+  EXPECT_GT(hold_s, 0.02);
+  EXPECT_GT(tracking.active_s, 2.0);
+  EXPECT_LE(largest_step_bar, experiment.actuation.slew_bar_per_s * period_s * (1.0 + 1e-9));
+}
+
+}  // namespace
+}  // namespace softarm

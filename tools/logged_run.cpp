@@ -1,0 +1,72 @@
+#include "logged_run.hpp"
+
+#include <fmt/format.h>
+
+#include <lcm/lcm-cpp.hpp>
+#include <stdexcept>
+
+#include "lock_step.hpp"
+#include "softarm/daemon/realtime.hpp"
+#include "softarm/transport/message_decoding.hpp"
+
+namespace softarm {
+
+LoggedRun::LoggedRun(const Experiment& experiment, const std::filesystem::path& log)
+    : experiment_(experiment),
+      pipeline_(experiment),
+      adapter_(experiment.daemon.bodies, experiment.arm),
+      clock_(experiment.daemon.capture_time, experiment.daemon.safety.frame_latency_s),
+      log_(std::make_unique<lcm::LogFile>(log.string(), "r")) {
+  if (!log_->good())
+    throw std::runtime_error(fmt::format(
+        "cannot read {}: is it an LCM log (softarm import, lcm-logger)?", log.string()));
+  if (!read_frame())
+    throw std::runtime_error(fmt::format(
+        "{} holds no frame on channel {}; daemon.lcm.mocap_channel says which to look for",
+        log.string(), experiment.daemon.lcm.mocap_channel));
+  start_ns_ = next_arrival_ns_;
+}
+
+LoggedRun::~LoggedRun() = default;
+
+bool LoggedRun::read_frame() {
+  softarm_messages::mocap_frame_t message;
+  while (const lcm::LogEvent* event = log_->readNextEvent()) {
+    if (event->channel != experiment_.daemon.lcm.mocap_channel) continue;
+    const auto* bytes = static_cast<const std::byte*>(event->data);
+    if (!decode({bytes, static_cast<std::size_t>(event->datalen)}, message)) {
+      ++malformed_;
+      continue;
+    }
+    // A log written from several sources may step back a little; time here does not.
+    next_arrival_ns_ = std::max(next_arrival_ns_, event->timestamp * 1000);
+    adapter_.to_frame(message, next_);
+    next_.capture_ns = clock_.capture_ns(next_arrival_ns_, message.capture_time_us);
+    return has_next_ = true;
+  }
+  return has_next_ = false;
+}
+
+bool LoggedRun::step(LogRow& row) {
+  if (!has_next_) return false;
+  const std::int64_t now_ns = start_ns_ + ticks_++ * pipeline_.period_ns();
+  frames_.clear();
+  while (has_next_ && next_arrival_ns_ <= now_ns) {
+    frames_.push_back(next_);
+    read_frame();
+  }
+  TickInput input;
+  input.now_ns = now_ns;
+  input.frames = frames_;
+  const std::int64_t before_ns = monotonic_now_ns();
+  pipeline_.tick(input);
+  tick_times_.add_ns(monotonic_now_ns() - before_ns);
+  fill_from_pipeline(pipeline_, experiment_.arm, row);
+  row.t_s = 1e-9 * static_cast<double>(now_ns - start_ns_);
+  row.truth.resize(0);
+  row.real.resize(0);
+  row.tip.reset();
+  return true;
+}
+
+}  // namespace softarm
