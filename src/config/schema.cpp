@@ -240,7 +240,7 @@ void describe_experiment(SchemaVisitor& visitor, Experiment& experiment) {
   ArmParameters& arm = experiment.arm;
   visitor.section({"arm", "", "what the controller believes about the arm", {}, kRequired},
                   SectionKind::plain, [&] {
-                    int segments = arm.size();
+                    int segments = std::max(1, arm.size());
                     visitor.integer(
                         {"segments", "", "how many", from_to(1, kMaxSegments), kRequired},
                         segments);

@@ -145,7 +145,11 @@ class TreeBuilder : public YAML::EventHandler {
       return;
     }
     Level& level = levels_.back();
-    if (level.node.kind == YamlNode::Kind::map) child.key_location = level.key_location;
+    if (level.node.kind == YamlNode::Kind::map) {
+      child.key_location = level.key_location;
+      // The parser notices that there is no value only where the next line starts.
+      if (child.kind == YamlNode::Kind::nothing) child.location = level.key_location;
+    }
     level.node.items.push_back(std::move(child));
     level.key_pending = false;
   }
