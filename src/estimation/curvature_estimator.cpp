@@ -2,18 +2,14 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <stdexcept>
+
+#include "softarm/model/entire_functions.hpp"
 
 namespace softarm {
 namespace {
-
-/// sin(x) / x, entire: c1(x^2).
-double sinc(double x) {
-  // Below this x^2 / 6 is lost against 1, so that the division is never near 0 / 0.
-  return std::abs(x) < 1e-8 ? 1.0 : std::sin(x) / x;
-}
 
 /// 2 atan2(h, v) / h for h >= 0, the factor that turns (v1, v2) into u. For v > 0 it is an even
 /// entire-like function of h with the limit 2 / v; the series serves where h / v could underflow or
@@ -28,6 +24,9 @@ double twice_angle_over(double h, double v) {
   }
   return 2.0 * std::atan2(h, v) / h;
 }
+
+/// c1(theta^2 / 4) = sin(theta / 2) / (theta / 2): chord over length of a PCC segment.
+double c1_of_half(const Eigen::Vector2d& u) { return entire_functions(0.25 * u.squaredNorm())[1]; }
 
 /// The relative transform (19) and what it measures.
 struct RelativePose {
@@ -207,7 +206,7 @@ void CurvatureEstimator::estimate(const MocapFrame& frame, CurvatureEstimate& ou
     out.variance_rad2[k] = one.valid ? one.variance_rad2 : 0.0;
     out.twist_rad[k] = one.valid ? one.twist_rad : 0.0;
     out.length_error_m[k] =
-        one.valid ? one.chord_m - segments_[k].length_m * sinc(0.5 * one.u_rad.norm()) : 0.0;
+        one.valid ? one.chord_m - segments_[k].length_m * c1_of_half(one.u_rad) : 0.0;
   }
 }
 
