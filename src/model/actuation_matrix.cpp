@@ -1,10 +1,27 @@
 #include "softarm/model/actuation_matrix.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "model/entire_series.hpp"
 
 namespace softarm {
+namespace {
+
+/// sin theta / theta with relative accuracy also where it vanishes: theta = |u| carries its
+/// rounding error along, which near pi would otherwise decide the quotient.
+double accurate_sinc(double x, double y) noexcept {
+  const double xx = x * x, yy = y * y;
+  const double s = xx + yy;
+  if (s < 1.0) return entire<8>(s)[1];
+  const double larger = std::max(xx, yy), smaller = std::min(xx, yy);
+  const double lost = std::fma(x, x, -xx) + std::fma(y, y, -yy) + (smaller - (s - larger));
+  const double theta = std::sqrt(s);
+  const double correction = (lost - std::fma(theta, theta, -s)) / (2.0 * theta);
+  return (std::sin(theta) + std::cos(theta) * correction) / theta;
+}
+
+}  // namespace
 
 Eigen::Matrix2d actuation_matrix(ActuationModel model, const Eigen::Vector2d& u_rad) noexcept {
   Eigen::Matrix2d A;
@@ -22,7 +39,7 @@ Eigen::Vector2d solve_actuation(ActuationModel model, const Eigen::Vector2d& u_r
                                 const Eigen::Vector2d& force_nm, double min_determinant) noexcept {
   if (model == ActuationModel::chamber) return {-force_nm.y(), force_nm.x()};
   const Eigen::Matrix2d A = actuation_matrix(model, u_rad);
-  const double c1 = entire<8>(u_rad.squaredNorm())[1];  // det A without a subtraction of products
+  const double c1 = accurate_sinc(u_rad.x(), u_rad.y());  // det A
   const double determinant =
       std::abs(c1) < min_determinant ? std::copysign(min_determinant, c1) : c1;
   return Eigen::Vector2d(A(1, 1) * force_nm.x() - A(0, 1) * force_nm.y(),

@@ -92,7 +92,9 @@ void compare(bool distributed) {
     for (const auto& [key, value] : got) {
       if (!expected.contains(key)) continue;
       const double ratio = golden::error_over_tolerance(c, expected, key, value);
-      EXPECT_LE(ratio, 1.0) << c.id << " " << key;
+      // A careful double implementation is far inside; a loss of digits must show long before it
+      // fails.
+      EXPECT_LE(ratio, 0.05) << c.id << " " << key;
       if (ratio >= worst[key].first) worst[key] = {ratio, c.id};
     }
   }

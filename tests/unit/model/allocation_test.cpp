@@ -1,0 +1,62 @@
+// The functions of the loop do not allocate: malloc is counted.
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cstdlib>
+#include <vector>
+
+#include "random_arm.hpp"
+#include "softarm/model/dynamics.hpp"
+#include "softarm/model/kinematics.hpp"
+#include "softarm/model/polar.hpp"
+
+#if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+#define SOFTARM_COUNTS_MALLOC 1
+namespace {
+std::atomic<long> allocations{0};
+}
+extern "C" void* __libc_malloc(std::size_t size);
+extern "C" void* malloc(std::size_t size) {  // operator new and Eigen both end here
+  allocations.fetch_add(1, std::memory_order_relaxed);
+  return __libc_malloc(size);
+}
+#endif
+
+namespace softarm {
+namespace {
+
+TEST(Allocation, NoneInTheLoop) {
+#ifdef SOFTARM_COUNTS_MALLOC
+  testing_support::RandomArm random(1);
+  for (const auto mass : {MassModel::point, MassModel::distributed}) {
+    const ArmParameters arm = random.arm(5, mass);
+    DynamicsWorkspace workspace(arm);
+    const auto s = random.state(5, 3.0);
+    Eigen::VectorXd out(10), G(10), q(10);
+    Eigen::MatrixXd B(10, 10), C(10, 10);
+    Eigen::Matrix3Xd J(3, 10), rate(3, 10);
+    std::vector<Eigen::Isometry3d> ends(5);
+    SegmentVector fixed = s.u;
+    const long before = allocations.load();
+    for (int i = 0; i < 100; ++i) {
+      inverse_dynamics(arm, workspace, fixed, s.v, s.v, s.a, {}, out);
+      dynamics_matrices(arm, workspace, s.u, s.v, B, C, G);
+      forward_dynamics(arm, workspace, s.u, s.v, s.a, out);
+      kinetic_energy(arm, workspace, s.u, s.v);
+      tip_jacobians(arm, s.u, s.v, J, rate);
+      forward_kinematics(arm, s.u, ends);
+      u_to_polar(s.u, q);
+      dynamics_to_polar(q, s.v, B, C, G);
+      jacobian_rate_to_polar(q, s.v, J, rate);
+    }
+    EXPECT_EQ(allocations.load() - before, 0);
+    const std::vector<int> counted(100);
+    EXPECT_GT(allocations.load() - before, 0) << "the counter itself must work";
+  }
+#else
+  GTEST_SKIP() << "malloc belongs to the sanitizer here";
+#endif
+}
+
+}  // namespace
+}  // namespace softarm
