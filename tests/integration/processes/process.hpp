@@ -17,10 +17,13 @@ namespace softarm::test {
 
 class Process {
  public:
-  /// Starts a program of the build; what it prints goes to `output`, a file.
+  /// Starts a program of the build, or one of the machine's if the name begins with a slash (its
+  /// folder is looked up); what it prints goes to `output`, a file.
   Process(const std::string& program, const std::vector<std::string>& arguments, std::string output)
       : output_(std::move(output)) {
-    const std::string path = std::string(SOFTARM_BINARY_DIR) + "/bin/" + program;
+    const bool of_machine = program.starts_with('/');
+    const std::string path =
+        of_machine ? program.substr(1) : std::string(SOFTARM_BINARY_DIR) + "/bin/" + program;
     std::vector<char*> argv{const_cast<char*>(path.c_str())};
     for (const std::string& argument : arguments)
       argv.push_back(const_cast<char*>(argument.c_str()));
@@ -30,7 +33,7 @@ class Process {
       const int file = open(output_.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0644);
       dup2(file, STDOUT_FILENO);
       dup2(file, STDERR_FILENO);
-      execv(path.c_str(), argv.data());
+      execvp(path.c_str(), argv.data());
       _exit(127);
     }
   }
