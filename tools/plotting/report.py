@@ -47,9 +47,10 @@ def tracking_table(log, from_s):
         theta = theta_told[i] if i < len(theta_told) and theta_told[i] is not None else theta_rms
         phi = phi_told[i] if i < len(phi_told) and phi_told[i] is not None else phi_rms
         rows.append([f"segment {i + 1}"] + [_fixed(1e3 * v, 2) for v in (theta, phi, u_rms, u_max)])
-    everything = np.sqrt(np.nanmean(tracking[:, 0] ** 2))
-    rows.append(["all", "", "", _fixed(1e3 * told.get("u_rms_rad", everything), 2),
-                 _fixed(1e3 * told.get("u_max_rad", np.nanmax(tracking[:, 1])), 2)])
+    u_rms, u_max = told.get("u_rms_rad"), told.get("u_max_rad")  # null where the truth is not known: a recording
+    u_rms = np.sqrt(np.nanmean(tracking[:, 0] ** 2)) if u_rms is None else u_rms
+    u_max = np.nanmax(tracking[:, 1]) if u_max is None else u_max
+    rows.append(["all", "", "", _fixed(1e3 * u_rms, 2), _fixed(1e3 * u_max, 2)])
     if told.get("tip_rms_m") is not None:
         rows.append(["tip [mm]", "", "", _fixed(1e3 * told["tip_rms_m"], 2), ""])
     return ["tracking error [mrad]", "θ rms", "φ rms", "u rms", "u max"], rows
