@@ -43,11 +43,15 @@ const TickOutput& ControlPipeline::tick(const TickInput& input) noexcept {
   // The command is held over the coming period: it is computed for the middle of it.
   const std::int64_t act_ns = input.now_ns + period_ns_ / 2;
   predict(act_ns);
+  safety.motion_unknown = !output_.motion.all_valid();
 
   const Mode before = safety_.mode();
   const Mode mode = safety_.step(safety);
   if (mode == Mode::active && before != Mode::active) {
-    reference_.start(seconds(act_ns), output_.motion.u_rad, output_.motion.velocity_radps);
+    // Frozen or vented for so many good frames the arm is at rest; its measured velocity would only
+    // be noise.
+    reference_.start(seconds(act_ns), output_.motion.u_rad,
+                     SegmentVector::Zero(settings_.arm.dof()));
     ++activations_;
   }
   take_reference(input);

@@ -50,7 +50,9 @@ constexpr std::array kCauses{
                    e.input.consecutive_overruns >= e.settings.vent_overruns;
           }},
     Cause{Reason::frames_late, Mode::hold,
-          [](const Evidence& e) { return e.frame_age_ns > e.thresholds.hold_after_ns; }},
+          [](const Evidence& e) {
+            return e.input.motion_unknown || e.frame_age_ns > e.thresholds.hold_after_ns;
+          }},
     Cause{Reason::poses_frozen, Mode::hold, [](const Evidence& e) { return e.input.poses_frozen; }},
     Cause{Reason::overruns, Mode::hold,
           [](const Evidence& e) {

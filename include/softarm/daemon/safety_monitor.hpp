@@ -56,6 +56,7 @@ struct SafetyInput {
   std::int64_t now_ns = 0;
   std::int64_t newest_capture_ns =
       std::numeric_limits<std::int64_t>::min();  ///< of the segment seen longest ago
+  bool motion_unknown = false;                   ///< u of some segment is not known at this tick
   int good_frames = 0;  ///< accepted since the last tick with every segment seen
   int bad_frames = 0;   ///< the others
   bool sender_restarted = false;
