@@ -11,11 +11,8 @@
 #include <stdexcept>
 
 #include "softarm/actuation/pressure_allocator.hpp"
-#include "softarm/config/load.hpp"
 #include "softarm/control/curvature_controller.hpp"
-#include "softarm/control/gain_check.hpp"
 #include "softarm/control/reference.hpp"
-#include "softarm/daemon/safety_monitor.hpp"
 
 namespace softarm {
 namespace {
@@ -233,47 +230,10 @@ class Checks {
   const ExperimentReader& reader_;
 };
 
-/// The largest theta (rad) that the phases themselves ask for.
-double largest_theta(const ReferenceSettings& reference) {
-  double largest = 0.0;
-  const auto consider = [&largest](const std::vector<double>& u) {
-    for (std::size_t i = 0; i + 1 < u.size(); i += 2) {
-      largest = std::max(largest, std::hypot(u[i], u[i + 1]));
-    }
-  };
-  for (const ReferencePhase& phase : reference.phases) {
-    if (const auto* hold = std::get_if<SetPointReference>(&phase.kind)) consider(hold->u_rad);
-    if (const auto* paper = std::get_if<PaperReference>(&phase.kind)) {
-      largest = std::max(largest, paper->theta_rad);
-    }
-    if (const auto* way = std::get_if<WayPointReference>(&phase.kind)) {
-      for (const WayPoint& point : way->points) consider(point.u_rad);
-    }
-  }
-  return largest;
-}
-
 }  // namespace
 
 void check_consistency(const Experiment& experiment, const ExperimentReader& reader) {
   Checks(experiment, reader).run();
-}
-
-std::vector<std::string> experiment_warnings(const Experiment& experiment) {
-  auto warnings =
-      gain_warnings(experiment.arm, experiment.control, largest_theta(experiment.reference));
-  const SafetyThresholds thresholds =
-      resolve_thresholds(experiment.daemon.safety, 1.0 / experiment.daemon.rate_hz);
-  const MocapSettings& mocap = experiment.plant.mocap;
-  const double oldest_s = mocap.latency_s + 1.0 / mocap.rate_hz;
-  const double hold_s = 1e-9 * static_cast<double>(thresholds.hold_after_ns);
-  if (oldest_s > hold_s) {
-    warnings.push_back(fmt::format(
-        "plant.mocap: its frames get {:.3g} s old, daemon.safety holds after {:.3g} s: the "
-        "simulated arm will never stay ACTIVE",
-        oldest_s, hold_s));
-  }
-  return warnings;
 }
 
 }  // namespace softarm

@@ -297,9 +297,10 @@ void describe_plant(SchemaVisitor& visitor, Experiment& experiment) {
                  kMethods, plant.method);
   visitor.number({"relative_tolerance", "", "of the integrator", from_to(1e-13, 1e-2)},
                  plant.relative_tolerance);
-  visitor.number({"absolute_tolerance", "rad",
-                  "of the integrator, for u; 1000 times that for u' in rad/s", from_to(1e-15, 1e-2)},
-                 plant.absolute_tolerance);
+  visitor.number(
+      {"absolute_tolerance", "rad", "of the integrator, for u; 1000 times that for u' in rad/s",
+       from_to(1e-15, 1e-2)},
+      plant.absolute_tolerance);
 }
 
 }  // namespace softarm

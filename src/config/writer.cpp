@@ -110,8 +110,9 @@ void ExperimentWriter::number(const Field& field, double& value) {
 void ExperimentWriter::optional_number(const Field& field, std::optional<double>& value) {
   if (value) return number(field, *value);
   if (!documented_) return;
+  document(field, "number");
   const auto outer = std::exchange(hint_depth_, hint_depth_.value_or(depth_));
-  entry(field, "0", "number");
+  line(fmt::format("{}: 0", field.key));
   hint_depth_ = outer;
 }
 

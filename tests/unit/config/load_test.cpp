@@ -226,8 +226,25 @@ TEST(Warnings, TellOfGainsThatTheDelayDoesNotAllowAndOfSlowFrames) {
   EXPECT_FALSE(experiment_warnings(load_text(text)).empty());
   text = replaced(kGoodExperiment, "valves:", "mocap: {rate_hz: 20}\n  valves:");
   const auto warnings = experiment_warnings(load_text(text));
-  ASSERT_FALSE(warnings.empty());
+  ASSERT_EQ(warnings.size(), 1u);
   EXPECT_NE(warnings.back().find("plant.mocap"), std::string::npos);
+}
+
+/// One segment without gravity: 0.3 rad against 0.626 N m/rad is 0.1878 N m; a chamber of 0.839 N
+/// m/bar in line with the bend gives that at 0.2238 bar.
+TEST(Warnings, TellOfPosesOutOfReach) {
+  const std::string one = R"(name: one
+arm: {segments: 1, length_m: 0.11, mass_kg: 0.15, stiffness_nm_per_rad: 0.626, damping_nms_per_rad: 0.029,
+      gravity_mps2: [0, 0, 0]}
+actuation: {chambers: {angle_rad: [0, pi/2, pi, 3*pi/2], gain_nm_per_bar: 0.839}, max_pressure_bar: 0.2239}
+control: {kp_nm_per_rad: 0.1}
+reference: [{kind: set_point, theta_rad: 0.3}]
+)";
+  EXPECT_TRUE(experiment_warnings(load_text(one)).empty());
+  const auto warnings = experiment_warnings(load_text(replaced(one, "0.2239", "0.1119")));
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_NE(warnings[0].find("reference[0]: the chambers give only 49 %"), std::string::npos)
+      << warnings[0];
 }
 
 }  // namespace

@@ -1,0 +1,109 @@
+// What is allowed but probably not meant.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "softarm/actuation/pressure_allocator.hpp"
+#include "softarm/config/load.hpp"
+#include "softarm/control/gain_check.hpp"
+#include "softarm/control/reference.hpp"
+#include "softarm/daemon/safety_monitor.hpp"
+#include "softarm/model/actuation_matrix.hpp"
+#include "softarm/model/dynamics.hpp"
+
+namespace softarm {
+namespace {
+
+/// Can the chambers hold the poses of the reference, at rest, against stiffness and gravity?
+class StaticReach {
+ public:
+  explicit StaticReach(const Experiment& experiment)
+      : arm_(experiment.arm),
+        workspace_(experiment.arm.size()),
+        allocator_(experiment.actuation),
+        zero_(Eigen::VectorXd::Zero(experiment.arm.dof())) {}
+
+  /// The smallest part s of the torque that a segment's chambers give in this pose (2n, rad).
+  double scale(const std::vector<double>& u_rad) {
+    const Eigen::VectorXd u = Eigen::Map<const Eigen::VectorXd>(u_rad.data(), arm_.dof());
+    Eigen::VectorXd force(arm_.dof());
+    const DynamicsTerms gravity_only = {.inertia = false, .coriolis = false, .gravity = true};
+    inverse_dynamics(arm_, workspace_, u, zero_, zero_, zero_, gravity_only, force);
+    for (int i = 0; i < arm_.size(); ++i) {
+      const double k = arm_.segments[static_cast<std::size_t>(i)].stiffness_nm_per_rad;
+      force.segment<2>(2 * i) += k * u.segment<2>(2 * i);
+    }
+    Eigen::VectorXd tau(arm_.dof());
+    solve_actuation(arm_, u, force, tau);
+    Allocation allocation;
+    allocator_.allocate(tau, allocation);
+    return allocation.scale.minCoeff();
+  }
+
+  double scale(const ReferenceKind& kind) {
+    double smallest = 1.0;
+    if (const auto* hold = std::get_if<SetPointReference>(&kind)) smallest = scale(hold->u_rad);
+    if (const auto* way = std::get_if<WayPointReference>(&kind)) {
+      for (const WayPoint& point : way->points) smallest = std::min(smallest, scale(point.u_rad));
+    }
+    if (const auto* paper = std::get_if<PaperReference>(&kind)) smallest = scale(*paper);
+    return smallest;
+  }
+
+ private:
+  double scale(const PaperReference& paper) {
+    constexpr int kInstants = 36;
+    constexpr double kTwoPi = 6.283185307179586;
+    double smallest = 1.0;
+    for (int k = 0; k < kInstants; ++k) {
+      std::vector<double> u;
+      for (int i = 0; i < arm_.size(); ++i) {
+        const double phi =
+            paper.phi_centre_rad +
+            paper.phi_amplitude_rad * std::cos(kTwoPi * k / kInstants + i * paper.phase_step_rad);
+        u.push_back(paper.theta_rad * std::cos(phi));
+        u.push_back(paper.theta_rad * std::sin(phi));
+      }
+      smallest = std::min(smallest, scale(u));
+    }
+    return smallest;
+  }
+
+  const ArmParameters& arm_;
+  DynamicsWorkspace workspace_;
+  PressureAllocator allocator_;
+  Eigen::VectorXd zero_;
+};
+
+}  // namespace
+
+std::vector<std::string> experiment_warnings(const Experiment& experiment) {
+  auto warnings =
+      gain_warnings(experiment.arm, experiment.control, largest_theta_rad(experiment.reference));
+
+  StaticReach reach(experiment);
+  for (std::size_t i = 0; i < experiment.reference.phases.size(); ++i) {
+    const double scale = reach.scale(experiment.reference.phases[i].kind);
+    if (scale < 1.0) {
+      warnings.push_back(fmt::format(
+          "reference[{}]: the chambers give only {:.0f} % of the torque that holds its poses", i,
+          std::floor(100.0 * scale)));
+    }
+  }
+
+  const SafetyThresholds thresholds =
+      resolve_thresholds(experiment.daemon.safety, 1.0 / experiment.daemon.rate_hz);
+  const MocapSettings& mocap = experiment.plant.mocap;
+  const double oldest_s = mocap.latency_s + 1.0 / mocap.rate_hz;
+  const double hold_s = 1e-9 * static_cast<double>(thresholds.hold_after_ns);
+  if (oldest_s > hold_s) {
+    warnings.push_back(fmt::format(
+        "plant.mocap: its frames get {:.3g} s old, daemon.safety holds after {:.3g} s: the "
+        "simulated arm will never stay ACTIVE",
+        oldest_s, hold_s));
+  }
+  return warnings;
+}
+
+}  // namespace softarm
