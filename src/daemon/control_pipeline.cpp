@@ -50,8 +50,8 @@ const TickOutput& ControlPipeline::tick(const TickInput& input) noexcept {
   if (mode == Mode::active && before != Mode::active) {
     // Frozen or vented for so many good frames the arm is at rest; its measured velocity would only
     // be noise.
-    reference_.start(seconds(act_ns), output_.motion.u_rad,
-                     SegmentVector::Zero(settings_.arm.dof()));
+    const SegmentVector at_rest = SegmentVector::Zero(settings_.arm.dof());
+    reference_.start(seconds(act_ns), output_.motion.u_rad, at_rest);
     ++activations_;
   }
   take_reference(input);
@@ -80,7 +80,9 @@ void ControlPipeline::validate_and_estimate(const TickInput& input, SafetyInput&
   const std::int64_t max_latency_ns = to_ns(settings_.daemon.safety.max_latency_s);
   for (const MocapFrame& frame : input.frames) {
     if (gap) break;
-    if (input.now_ns - frame.capture_ns > max_latency_ns) {
+    // A capture yet to come would make all after it look old, and its age hide the silence of the
+    // sender.
+    if (frame.capture_ns < input.now_ns - max_latency_ns || frame.capture_ns > input.now_ns) {
       ++late_frames_;
       ++safety.bad_frames;
       continue;
@@ -143,11 +145,11 @@ void ControlPipeline::expect(std::int64_t at_ns) noexcept {
 
 void ControlPipeline::take_reference(const TickInput& input) noexcept {
   output_.reference_limited = false;
-  if (input.reference == nullptr || !reference_.started()) return;
+  if (input.reference == nullptr || safety_.mode() != Mode::active) return;
   const LiveVerdict verdict =
       reference_.receive(seconds(input.now_ns), input.reference->u, input.reference->velocity,
                          input.reference->acceleration);
-  output_.reference_limited = verdict != LiveVerdict::accepted;
+  output_.reference_limited = verdict != LiveVerdict::accepted && verdict != LiveVerdict::not_live;
 }
 
 void ControlPipeline::control() noexcept {

@@ -67,11 +67,18 @@ std::int64_t age(std::int64_t now_ns, std::int64_t then_ns) noexcept {
   return then_ns == kNever ? std::numeric_limits<std::int64_t>::max() : now_ns - then_ns;
 }
 
+/// The values named may come off the wire.
+template <class Enumeration, std::size_t count>
+const char* name_of(Enumeration value, const std::array<const char*, count>& names) noexcept {
+  const auto index = static_cast<std::size_t>(value);
+  return index < count ? names[index] : "unknown";
+}
+
 }  // namespace
 
 const char* name(Mode mode) noexcept {
   constexpr std::array kNames{"INIT", "WAIT_FRAMES", "ACTIVE", "HOLD", "VENT", "FAULT"};
-  return kNames[static_cast<std::size_t>(mode)];
+  return name_of(mode, kNames);
 }
 
 const char* name(Reason reason) noexcept {
@@ -79,7 +86,7 @@ const char* name(Reason reason) noexcept {
       "none",         "starting",      "waiting_for_frames", "waiting_for_arm",  "frames_late",
       "poses_frozen", "overruns",      "frames_stale",       "sender_restarted", "soft_limit",
       "time_gap",     "many_overruns", "disarmed",           "shutdown",         "valves_silent"};
-  return kNames[static_cast<std::size_t>(reason)];
+  return name_of(reason, kNames);
 }
 
 SafetyThresholds resolve_thresholds(const SafetySettings& settings,

@@ -70,7 +70,8 @@ class ControlPipeline {
 
   const TickOutput& output() const noexcept { return output_; }
   const FrameCounters& counters() const noexcept { return validator_.counters(); }
-  std::int64_t late_frames() const noexcept { return late_frames_; }  ///< dropped for max_latency_s
+  /// Dropped for their age: captured more than max_latency_s ago, or not yet.
+  std::int64_t late_frames() const noexcept { return late_frames_; }
   /// u and residuals of the newest accepted frame.
   const CurvatureEstimate& estimate() const noexcept { return validator_.estimate(); }
   /// Every commanded pressure is zero.

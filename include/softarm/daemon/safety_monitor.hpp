@@ -39,6 +39,7 @@ enum class Reason : std::int8_t {
   valves_silent
 };
 
+/// As above, in static storage; "unknown" for a value outside the enumeration.
 const char* name(Mode mode) noexcept;
 const char* name(Reason reason) noexcept;
 

@@ -179,6 +179,15 @@ TEST(SafetyMonitor, TheMoreSevereCauseWins) {
   EXPECT_EQ(bench.monitor.reason(), Reason::shutdown);
 }
 
+TEST(SafetyMonitor, NamesWhateverTheWireMayBring) {
+  EXPECT_STREQ(name(Mode::fault), "FAULT");
+  EXPECT_STREQ(name(Reason::valves_silent), "valves_silent");
+  for (const int value : {-128, -1, 15, 100, 127}) {
+    EXPECT_STREQ(name(static_cast<Mode>(value)), "unknown");
+    EXPECT_STREQ(name(static_cast<Reason>(value)), "unknown");
+  }
+}
+
 TEST(SafetyMonitor, RandomSequencesNeverBreakTheInvariants) {
   std::mt19937 random(7);
   const auto chance = [&random](double p) { return std::bernoulli_distribution(p)(random); };

@@ -1,0 +1,191 @@
+// The daemon's side of LCM over real UDP multicast: ten thousand ticks without a call for memory on
+// the tick's thread, and what it takes for an order.
+#include "softarm/transport/daemon_link.hpp"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <memory>
+#include <thread>
+
+#include "counted_malloc.hpp"
+#include "softarm/daemon/realtime.hpp"
+#include "unit/transport/messages.hpp"
+
+namespace softarm {
+namespace {
+
+using namespace softarm_messages;
+
+class DaemonLinkOverUdp : public ::testing::Test {
+ protected:
+  DaemonLinkOverUdp() {
+    settings.arm.segments.resize(3);
+    settings.actuation.segments.assign(
+        3, {{0.0, 0.839}, {1.570796, 0.839}, {3.141593, 0.839}, {4.712389, 0.839}});
+    settings.control.kp.assign(6, 1.0);
+    settings.control.kd.assign(6, 0.002);
+    settings.reference.phases = {{LiveReference{}, 0.0}};
+    settings.daemon.bodies = {.base_id = 0, .segment_ids = {1, 2, 3}};
+    settings.daemon.safety.valve_readback = true;
+    settings.daemon.lcm.url =
+        "udpm://239.255.76.67:" + std::to_string(20000 + getpid() % 40000) + "?ttl=0";
+  }
+  void SetUp() override {
+    try {
+      sender = std::make_unique<LcmNode>(settings.daemon.lcm.url);
+      link = std::make_unique<DaemonLink>(settings, Provenance{.version = "test"}, false);
+    } catch (const TransportError& error) {
+      GTEST_SKIP() << error.what();
+    }
+  }
+
+  mocap_frame_t straight_frame(std::int64_t number) const {
+    mocap_frame_t message{};
+    message.frame_number = number;
+    message.capture_time_us = monotonic_now_ns() / 1000;
+    message.num_bodies = 4;
+    message.bodies.resize(4);
+    for (int i = 0; i < 4; ++i) {
+      auto& body = message.bodies[static_cast<std::size_t>(i)];
+      body = {};
+      body.id = i;
+      body.valid = 1;
+      body.position_m[2] = -0.11 * i + 1e-6 * static_cast<double>(number % 3);
+      body.orientation[1] = 1.0;  // hanging: half a turn about x
+    }
+    return message;
+  }
+
+  /// Collects until `reached` says so of an input, for at most a second.
+  template <class Condition>
+  bool collect_until(Condition reached) {
+    const std::int64_t end_ns = monotonic_now_ns() + 1'000'000'000;
+    while (monotonic_now_ns() < end_ns) {
+      if (reached(link->collect(monotonic_now_ns()))) return true;
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+    return false;
+  }
+
+  PipelineSettings settings;
+  std::unique_ptr<LcmNode> sender;
+  std::unique_ptr<DaemonLink> link;
+};
+
+TEST_F(DaemonLinkOverUdp, TenThousandTicksAllocateNothing) {
+  ControlPipeline pipeline(settings);
+  LoopTiming timing;
+  const LcmSettings& lcm = settings.daemon.lcm;
+  pressure_measurement_t measurement = test::example<pressure_measurement_t>(3, 4);
+  curvature_reference_t reference = test::example<curvature_reference_t>(3, 4);
+  operator_command_t operator_command{.sequence = 0, .request = operator_command_t::ARM};
+  const timing_t not_a_frame = test::example<timing_t>(0, 0);
+  std::int64_t frames = 0, references = 0, active = 0;
+  long allocated = 0, released = 0;
+  // LCM itself allocates when it meets a channel for the first time; that is start-up.
+  constexpr int kStartup = 100, kTicks = 10'000;
+  for (int k = 0; k < kStartup + kTicks; ++k) {
+    sender->publish(lcm.mocap_channel, straight_frame(k));
+    sender->publish(lcm.measurement_channel, measurement);
+    if (k % 10 == 0) {
+      reference.sequence = k;
+      sender->publish(lcm.reference_channel, reference);
+      operator_command.sequence = k + 1;
+      sender->publish(lcm.operator_channel, operator_command);
+      sender->publish(lcm.mocap_channel, not_a_frame);
+    }
+    const long allocated_before = test::thread_allocations;
+    const long released_before = test::thread_releases;
+    const TickInput input = link->collect(monotonic_now_ns());
+    const TickOutput& output = pipeline.tick(input);
+    link->publish_command(monotonic_now_ns(), output);
+    ++timing.ticks;
+    link->publish_status(input.now_ns, pipeline, timing);
+    if (k % 100 == 0) link->publish_timing(input.now_ns, timing);
+    if (k >= kStartup) {
+      allocated += test::thread_allocations - allocated_before;
+      released += test::thread_releases - released_before;
+    }
+    frames += std::ssize(input.frames);
+    references += input.reference != nullptr ? 1 : 0;
+    active += output.mode == Mode::active ? 1 : 0;
+  }
+  EXPECT_EQ(allocated, 0);
+  EXPECT_EQ(released, 0);
+  EXPECT_GT(frames, kTicks / 2);
+  EXPECT_GT(references, kTicks / 40);
+  EXPECT_GT(active, 0);
+  EXPECT_GT(link->malformed(), 0);
+  EXPECT_EQ(link->unsent(), 0);
+}
+
+TEST_F(DaemonLinkOverUdp, AFloodIsBoundedWork) {
+  for (int k = 0; k < 2000; ++k)
+    sender->publish(settings.daemon.lcm.mocap_channel, straight_frame(k));
+  std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  EXPECT_LE(link->collect(monotonic_now_ns()).frames.size(), 64u);
+}
+
+TEST_F(DaemonLinkOverUdp, CapturesLieBetweenTheLastCollectionAndNow) {
+  link->collect(monotonic_now_ns());
+  std::int64_t number = 0;
+  ASSERT_TRUE(collect_until([&](const TickInput& input) {
+    sender->publish(settings.daemon.lcm.mocap_channel, straight_frame(++number));
+    for (const MocapFrame& frame : input.frames) {
+      EXPECT_LE(frame.capture_ns, input.now_ns);
+      EXPECT_GT(frame.capture_ns, input.now_ns - 1'000'000'000);
+    }
+    return number > 20 && !input.frames.empty();
+  }));
+}
+
+TEST_F(DaemonLinkOverUdp, ADisarmIsObeyedWhateverItsNumber) {
+  const auto request = [this](std::int64_t sequence, std::int8_t what) {
+    sender->publish(settings.daemon.lcm.operator_channel,
+                    operator_command_t{.sequence = sequence, .request = what});
+  };
+  request(1000, operator_command_t::ARM);
+  ASSERT_TRUE(collect_until([](const TickInput& input) { return input.arm; }));
+  // Another person's machine, on which less time has passed.
+  request(10, operator_command_t::ARM);
+  request(11, operator_command_t::DISARM);
+  ASSERT_TRUE(collect_until([](const TickInput& input) {
+    EXPECT_FALSE(input.arm) << "an older ARM is ignored";
+    return input.disarm;
+  }));
+  request(1000, operator_command_t::ARM);
+  request(2000, operator_command_t::ARM);
+  int armed = 0;
+  ASSERT_TRUE(collect_until([&](const TickInput& input) { return (armed += input.arm) > 0; }));
+}
+
+TEST_F(DaemonLinkOverUdp, AReferenceThatBeginsAnewIsHeardAfterASilence) {
+  curvature_reference_t reference = test::example<curvature_reference_t>(3, 4);
+  const auto send = [&](std::int64_t sequence) {
+    reference.sequence = sequence;
+    sender->publish(settings.daemon.lcm.reference_channel, reference);
+  };
+  const auto came = [](const TickInput& input) { return input.reference != nullptr; };
+  send(5000);
+  ASSERT_TRUE(collect_until(came));
+  send(1);
+  EXPECT_FALSE(collect_until(came)) << "older";  // this takes a second of silence
+  send(2);
+  EXPECT_TRUE(collect_until(came));
+  send(1);
+  send(3);
+  ASSERT_TRUE(collect_until(came));
+}
+
+TEST_F(DaemonLinkOverUdp, AReferenceOfAnotherSizeIsMalformed) {
+  sender->publish(settings.daemon.lcm.reference_channel,
+                  test::example<curvature_reference_t>(2, 4));
+  EXPECT_TRUE(collect_until([this](const TickInput& input) {
+    EXPECT_EQ(input.reference, nullptr);
+    return link->malformed() == 1;
+  }));
+}
+
+}  // namespace
+}  // namespace softarm

@@ -1,0 +1,139 @@
+// Valid messages of every type, of any size, with numbers that can be told apart.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "softarm/transport/message_decoding.hpp"
+
+namespace softarm::test {
+
+using Bytes = std::vector<std::byte>;
+
+template <class Message>
+Bytes encoded(const Message& message) {
+  Bytes bytes(static_cast<std::size_t>(message.getEncodedSize()));
+  if (message.encode(bytes.data(), 0, static_cast<int>(bytes.size())) !=
+      static_cast<int>(bytes.size()))
+    bytes.clear();
+  return bytes;
+}
+
+template <class Number>
+std::vector<Number> numbers(int count, double first) {
+  std::vector<Number> list;
+  for (int k = 0; k < count; ++k) list.push_back(static_cast<Number>(first + 0.25 * k));
+  return list;
+}
+template <class Number>
+std::vector<std::vector<Number>> pairs(int count, double first) {
+  std::vector<std::vector<Number>> list;
+  for (int k = 0; k < count; ++k) list.push_back(numbers<Number>(2, first + k));
+  return list;
+}
+
+/// A message for `segments` segments of `chambers` chambers each; its bodies include the base.
+template <class Message>
+Message example(int segments, int chambers);
+
+template <>
+inline softarm_messages::mocap_frame_t example(int segments, int /*chambers*/) {
+  softarm_messages::mocap_frame_t message;
+  message.frame_number = 123'456'789'012;
+  message.capture_time_us = -5;
+  message.num_bodies = static_cast<std::int16_t>(segments + 1);
+  for (int i = 0; i <= segments; ++i) {
+    softarm_messages::mocap_body_t body{};
+    body.id = 1000 * i - 7;
+    body.valid = i % 2 == 0;
+    for (int axis = 0; axis < 3; ++axis) body.position_m[axis] = 0.1 * i + axis;
+    for (int k = 0; k < 4; ++k) body.orientation[k] = 0.5 - k - i;
+    message.bodies.push_back(body);
+  }
+  return message;
+}
+
+template <>
+inline softarm_messages::pressure_command_t example(int segments, int chambers) {
+  return {.sequence = 42,
+          .time_us = 43,
+          .validity_us = 100'000,
+          .shadow = 1,
+          .num_chambers = static_cast<std::int16_t>(segments * chambers),
+          .pressure_bar = numbers<float>(segments * chambers, 0.5)};
+}
+
+template <>
+inline softarm_messages::pressure_measurement_t example(int segments, int chambers) {
+  return {.sequence = -1,
+          .time_us = 44,
+          .num_chambers = static_cast<std::int16_t>(segments * chambers),
+          .pressure_bar = numbers<float>(segments * chambers, 0.125)};
+}
+
+template <>
+inline softarm_messages::curvature_reference_t example(int segments, int /*chambers*/) {
+  return {.sequence = 7,
+          .dimension = static_cast<std::int16_t>(2 * segments),
+          .u_rad = numbers<double>(2 * segments, 0.1),
+          .velocity_radps = numbers<double>(2 * segments, 100.1),
+          .acceleration_radps2 = numbers<double>(2 * segments, -100.1)};
+}
+
+template <>
+inline softarm_messages::operator_command_t example(int /*segments*/, int /*chambers*/) {
+  return {.sequence = 99, .request = softarm_messages::operator_command_t::ARM};
+}
+
+template <>
+inline softarm_messages::controller_status_t example(int segments, int chambers) {
+  softarm_messages::controller_status_t message{};
+  message.tick = 17;
+  message.version = "0.1.0 0123456789abcdef0123456789abcdef01234567-dirty";
+  message.mode = 2;
+  message.flags = 33;
+  message.frame_age_s = 0.005F;
+  message.messages_malformed = 3;
+  message.num_segments = static_cast<std::int16_t>(segments);
+  message.num_chambers = static_cast<std::int16_t>(segments * chambers);
+  message.u_rad = pairs<float>(segments, 1.0);
+  message.velocity_radps = pairs<float>(segments, 100.0);
+  message.reference_u_rad = pairs<float>(segments, 200.0);
+  message.phi_rad = numbers<float>(segments, 300.0);
+  message.theta_rad = numbers<float>(segments, 400.0);
+  message.tau_actuation_nm = pairs<float>(segments, 500.0);
+  message.residual_twist_rad = numbers<float>(segments, 600.0);
+  message.residual_length_m = numbers<float>(segments, 700.0);
+  message.pressure_bar = numbers<float>(segments * chambers, 800.0);
+  return message;
+}
+
+template <>
+inline softarm_messages::plant_state_t example(int segments, int chambers) {
+  softarm_messages::plant_state_t message{};
+  message.time_us = 45;
+  message.vented = 1;
+  message.num_segments = static_cast<std::int16_t>(segments);
+  message.num_chambers = static_cast<std::int16_t>(segments * chambers);
+  message.u_rad = pairs<double>(segments, 1.0);
+  message.velocity_radps = pairs<double>(segments, 50.0);
+  message.pressure_bar = numbers<float>(segments * chambers, 0.0);
+  for (int axis = 0; axis < 3; ++axis) message.tip_m[axis] = axis;
+  return message;
+}
+
+template <>
+inline softarm_messages::timing_t example(int /*segments*/, int /*chambers*/) {
+  softarm_messages::timing_t message{};
+  message.ticks = 1'000'000;
+  for (int k = 0; k < 32; ++k) {
+    message.lateness_count[k] = k;
+    message.publish_count[k] = 100 - k;
+  }
+  message.max_us[3] = 1.5F;
+  return message;
+}
+
+}  // namespace softarm::test
