@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "experiment_log.hpp"
+#include "log_row.hpp"
 #include "softarm/config/experiment.hpp"
 #include "softarm/daemon/control_pipeline.hpp"
 #include "softarm/daemon/histogram.hpp"

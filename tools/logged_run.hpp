@@ -7,9 +7,10 @@
 #include <memory>
 #include <vector>
 
-#include "experiment_log.hpp"
+#include "log_row.hpp"
 #include "softarm/config/experiment.hpp"
 #include "softarm/daemon/control_pipeline.hpp"
+#include "softarm/daemon/histogram.hpp"
 #include "softarm/estimation/clock_relation.hpp"
 #include "softarm/transport/mocap_adapter.hpp"
 

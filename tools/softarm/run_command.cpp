@@ -17,6 +17,7 @@
 #include "softarm/commands.hpp"
 #include "softarm/config/load.hpp"
 #include "softarm/daemon/realtime.hpp"
+#include "tracking_summary.hpp"
 
 namespace softarm {
 namespace {

@@ -16,6 +16,7 @@
 #include "softarm/model/kinematics.hpp"
 #include "softarm/transport/lcm_node.hpp"
 #include "softarm/transport/message_decoding.hpp"
+#include "tracking_summary.hpp"
 
 namespace softarm {
 namespace {
