@@ -66,6 +66,10 @@ DaemonLink::DaemonLink(const PipelineSettings& settings, Provenance provenance, 
 
   // Everything that grows is grown here, so that the loop never has to.
   frame_message_.bodies.reserve(4 * static_cast<std::size_t>(kMaxBodies));
+  for (auto* list : {&reference_message_.u_rad, &reference_message_.velocity_radps,
+                     &reference_message_.acceleration_radps2})
+    list->reserve(2 * kMaxSegments);
+  measurement_message_.pressure_bar.reserve(kMaxChambers);
   command_message_.shadow = shadow ? 1 : 0;
   command_message_.validity_us =
       static_cast<std::int32_t>(std::lround(1e6 * settings_.lcm.command_validity_s));
