@@ -7,7 +7,7 @@
 namespace softarm {
 namespace {
 
-enum Stream : std::uint64_t { kNoiseStream = 1, kDropoutStream = 2 };
+enum Stream : std::uint64_t { noise_stream = 1, dropout_stream = 2 };
 
 void expect(bool holds, const char* key, const char* expected, double got) {
   if (!holds) {
@@ -42,8 +42,8 @@ MocapSimulator::MocapSimulator(const MocapSettings& settings, int segments, std:
       start_ns_(start_ns),
       latency_ns_(std::llround(settings.latency_s * 1e9)),
       next_capture_ns_(start_ns),
-      noise_(seed, kNoiseStream),
-      dropouts_(seed, kDropoutStream),
+      noise_(seed, noise_stream),
+      dropouts_(seed, dropout_stream),
       queue_(static_cast<std::size_t>(std::ceil(settings.latency_s * settings.rate_hz)) + kSlack) {}
 
 void MocapSimulator::schedule() noexcept {
