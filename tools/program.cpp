@@ -34,8 +34,10 @@ int parse_and_run(int argc, char** argv, CLI::App& app, const std::function<int(
 const char* version_text() noexcept { return SOFTARM_VERSION; }
 const char* commit_text() noexcept { return SOFTARM_COMMIT; }
 
+void say(const std::string& text) noexcept { std::fputs(text.c_str(), stderr); }
+
 void print_error(const std::string& program, const std::string& message) {
-  fmt::print(stderr, "{}: error: {}\n", program, message);
+  say(fmt::format("{}: error: {}\n", program, message));
 }
 
 int run_program(int argc, char** argv, CLI::App& app, const std::function<int()>& body) {

@@ -21,6 +21,10 @@ const char* version_text() noexcept;
 /// The commit this was built from, "-dirty" where the tree differed from it.
 const char* commit_text() noexcept;
 
+/// Prints on stderr. What cannot be written (a full disk, a closed pipe) is lost: no program that
+/// moves an arm may end for that.
+void say(const std::string& text) noexcept;
+
 /// Prints "NAME: error: MESSAGE" on stderr.
 void print_error(const std::string& program, const std::string& message);
 

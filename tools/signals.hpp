@@ -15,4 +15,7 @@ inline void catch_stop_signals() noexcept {
   sigaction(SIGINT, &action, nullptr);
 }
 
+/// A reader of our messages that goes away must not end us.
+inline void ignore_broken_pipes() noexcept { std::signal(SIGPIPE, SIG_IGN); }
+
 }  // namespace softarm

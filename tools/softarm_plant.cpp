@@ -27,19 +27,24 @@ class PlantProcess {
         report_period_ns_(static_cast<std::int64_t>(1e9 / experiment.plant.mocap.rate_hz)) {
     // No exception may pass through LCM, so the handler only takes the message; the loop acts on
     // it.
-    node_.subscribe(lcm_.command_channel, 64, [this](const ReceivedMessage& packet) {
+    node_.subscribe(lcm_.command_channel, kCommandCapacity, [this](const ReceivedMessage& packet) {
       command_received_ = decode(packet.bytes, command_message_);
     });
   }
 
   void run() {
-    std::int64_t next_report_ns = monotonic_now_ns();
+    std::int64_t next_report_ns = arm_.time_ns();
     while (stop_requested == 0) {
-      node_.wait_until(std::min(next_report_ns, arm_.next_event_ns()));
-      if (std::exchange(command_received_, false)) take_command();
+      if (node_.wait_until(std::min(next_report_ns, arm_.next_event_ns()) + lost_ns_)) {
+        // All that came meanwhile: a full queue would keep the oldest commands and drop the newest.
+        int taken = 0;
+        do {
+          if (std::exchange(command_received_, false)) take_command();
+        } while (++taken < kCommandCapacity && node_.drain(1) > 0);
+      }
       advance();
       for (MocapFrame frame; arm_.receive(frame);) {
-        adapter_.to_message(frame, frame.capture_ns / 1000, frame_message_);
+        adapter_.to_message(frame, (frame.capture_ns + lost_ns_) / 1000, frame_message_);
         node_.publish(lcm_.mocap_channel, frame_message_);
       }
       if (arm_.time_ns() >= next_report_ns) {
@@ -50,11 +55,26 @@ class PlantProcess {
   }
 
  private:
+  static constexpr int kCommandCapacity = 64;
+  /// What the arm catches up with after a stall. Beyond that its time stands still, or a machine
+  /// that is too slow would fall behind further with every step.
+  static constexpr std::int64_t kMostBehind_ns = 250'000'000;
+
+  /// The arm's own time: the monotonic clock without what was lost.
+  std::int64_t arm_now_ns() {
+    const std::int64_t now_ns = monotonic_now_ns() - lost_ns_;
+    const std::int64_t excess_ns = now_ns - arm_.time_ns() - kMostBehind_ns;
+    if (excess_ns <= 0) return now_ns;
+    lost_ns_ += excess_ns;
+    say(fmt::format("softarm-plant: {:.3f} s behind real time; the arm stood still meanwhile\n",
+                    1e-9 * static_cast<double>(excess_ns)));
+    return now_ns - excess_ns;
+  }
+
   void advance() {
     const bool was_vented = arm_.vented();
-    arm_.advance_to(monotonic_now_ns());
-    if (arm_.vented() && !was_vented)
-      fmt::print(stderr, "softarm-plant: commands have stopped; vented\n");
+    arm_.advance_to(arm_now_ns());
+    if (arm_.vented() && !was_vented) say("softarm-plant: commands have stopped; vented\n");
   }
 
   void take_command() {
@@ -66,15 +86,15 @@ class PlantProcess {
                       .validity_ns = std::int64_t{command_message_.validity_us} * 1000,
                       .shadow = command_message_.shadow != 0,
                       .pressure_bar = pressure_bar_},
-                     monotonic_now_ns());
+                     arm_now_ns());
     if (was_vented && verdict == CommandVerdict::in_force)
-      fmt::print(stderr, "softarm-plant: commands have begun\n");
+      say("softarm-plant: commands have begun\n");
   }
 
   void publish_state() {
     const ArmPlant& plant = arm_.plant();
     const Eigen::VectorXd& pressure = arm_.measured_pressures_bar();
-    measurement_message_.time_us = arm_.time_ns() / 1000;
+    measurement_message_.time_us = (arm_.time_ns() + lost_ns_) / 1000;
     measurement_message_.sequence = arm_.sequence();
     measurement_message_.num_chambers = static_cast<std::int16_t>(pressure.size());
     measurement_message_.pressure_bar.assign(pressure.begin(), pressure.end());
@@ -103,6 +123,7 @@ class PlantProcess {
   LcmNode node_;
   SimulatedArm arm_;
   std::int64_t report_period_ns_;
+  std::int64_t lost_ns_ = 0;
   bool command_received_ = false;
   std::vector<double> pressure_bar_;
   softarm_messages::mocap_frame_t frame_message_;
@@ -114,10 +135,11 @@ class PlantProcess {
 int serve(const std::string& path) {
   const Experiment experiment = load_experiment(path);
   catch_stop_signals();
-  fmt::print(stderr,
-             "softarm-plant {} commit {} configuration {} seed {}: {}, motion capture at {} Hz\n",
-             version_text(), commit_text(), hash_text(experiment.hash), experiment.seed,
-             experiment.name, experiment.plant.mocap.rate_hz);
+  ignore_broken_pipes();
+  say(fmt::format(
+      "softarm-plant {} commit {} configuration {} seed {}: {}, motion capture at {} Hz\n",
+      version_text(), commit_text(), hash_text(experiment.hash), experiment.seed, experiment.name,
+      experiment.plant.mocap.rate_hz));
   PlantProcess(experiment).run();
   return kExitOk;
 }

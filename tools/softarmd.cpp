@@ -1,6 +1,7 @@
 // softarmd: the control daemon. Motion-capture frames in, valve pressures out, at a fixed rate.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <iostream>
@@ -9,7 +10,6 @@
 #include "program.hpp"
 #include "signals.hpp"
 #include "softarm/config/load.hpp"
-#include "softarm/control/gain_check.hpp"
 #include "softarm/daemon/realtime.hpp"
 #include "softarm/transport/daemon_link.hpp"
 
@@ -46,12 +46,12 @@ class ModeLog {
       for (std::size_t tail = tail_.load(); tail != head_.load(std::memory_order_acquire);
            tail_.store(++tail)) {
         const Entry& entry = entries_[tail % kCapacity];
-        fmt::print(stderr, "softarmd: {:.3f} s: {} ({})\n",
-                   1e-9 * static_cast<double>(entry.since_start_ns), name(entry.mode),
-                   name(entry.reason));
+        say(fmt::format("softarmd: {:.3f} s: {} ({})\n",
+                        1e-9 * static_cast<double>(entry.since_start_ns), name(entry.mode),
+                        name(entry.reason)));
       }
       if (const auto lost = lost_.exchange(0); lost > 0)
-        fmt::print(stderr, "softarmd: {} mode changes came too fast to be printed\n", lost);
+        say(fmt::format("softarmd: {} mode changes came too fast to be printed\n", lost));
       if (last) return;
       std::this_thread::sleep_for(std::chrono::milliseconds(50));
     }
@@ -66,7 +66,7 @@ class ModeLog {
 /// Keeps the deadline, and the account of how well it was kept.
 class DaemonLoop {
  public:
-  DaemonLoop(const Experiment& experiment, bool shadow)
+  DaemonLoop(const Experiment& experiment, bool shadow, ModeLog& log)
       : pipeline_(experiment),
         link_(experiment,
               {.version = fmt::format("{} {}", version_text(), commit_text()),
@@ -74,7 +74,8 @@ class DaemonLoop {
                .seed = experiment.seed},
               shadow),
         judge_overruns_(experiment.daemon.realtime.fifo),
-        ticks_per_second_(static_cast<std::int64_t>(experiment.daemon.rate_hz)) {}
+        ticks_per_second_(static_cast<std::int64_t>(experiment.daemon.rate_hz)),
+        log_{.log = log} {}
 
   /// Returns once a stop was requested and every pressure has been commanded to zero.
   void run() {
@@ -128,9 +129,9 @@ class DaemonLoop {
       reason = output.reason;
       log.add(since_start_ns, mode, reason);
     }
+    ModeLog& log;
     Mode mode = Mode::init;
     Reason reason = Reason::none;
-    ModeLog log;
   };
 
   ControlPipeline pipeline_;
@@ -145,22 +146,21 @@ class DaemonLoop {
 void print_summary(const DaemonLoop& loop) {
   const LoopTiming& timing = loop.timing();
   const auto line = [](const char* what, const DurationHistogram& histogram) {
-    fmt::print(stderr, "softarmd: {:<10} p50 {:>8.1f} us   p99 {:>8.1f} us   max {:>8.1f} us\n",
-               what, quantile_us(histogram.counts(), 0.5), quantile_us(histogram.counts(), 0.99),
-               histogram.max_us());
+    say(fmt::format("softarmd: {:<10} p50 {:>8.1f} us   p99 {:>8.1f} us   max {:>8.1f} us\n", what,
+                    quantile_us(histogram.counts(), 0.5), quantile_us(histogram.counts(), 0.99),
+                    histogram.max_us()));
   };
   line("lateness", timing.lateness);
   line("frame age", timing.frame_age);
   line("tick", timing.tick);
   line("publish", timing.publish);
   const FrameCounters& frames = loop.pipeline().counters();
-  fmt::print(
-      stderr,
+  say(fmt::format(
       "softarmd: {} ticks, {} missed; frames: {} accepted, {} rejected, {} repeated, {} missing; "
       "{} malformed messages, {} not sent\n",
       timing.ticks, timing.overruns, frames.accepted,
       frames.rejected() + loop.pipeline().late_frames(), frames.repeated, frames.missing,
-      loop.link().malformed(), loop.link().unsent());
+      loop.link().malformed(), loop.link().unsent()));
 }
 
 int serve(const std::string& path, bool shadow) {
@@ -175,18 +175,23 @@ int serve(const std::string& path, bool shadow) {
     return kExitOtherInstance;
   }
   catch_stop_signals();
+  ignore_broken_pipes();
 
-  fmt::print(stderr, "softarmd {} commit {} configuration {:016x} seed {}: {} at {} Hz{}\n",
-             version_text(), commit_text(), experiment.hash, experiment.seed, experiment.name,
-             experiment.daemon.rate_hz,
-             shadow ? ", shadow: commands are marked as not for the valves" : "");
-  for (const std::string& warning :
-       gain_warnings(experiment.arm, experiment.control, largest_theta_rad(experiment.reference)))
-    fmt::print(stderr, "softarmd: warning: {}\n", warning);
-  // LCM's receive thread inherits the scheduling in force when it starts, so that comes first.
-  for (const std::string& refused : apply_realtime_settings(experiment.daemon.realtime))
-    fmt::print(stderr, "softarmd: warning: {}\n", refused);
-  DaemonLoop loop(experiment, shadow);
+  say(fmt::format("softarmd {} commit {} configuration {:016x} seed {}: {} at {} Hz{}\n",
+                  version_text(), commit_text(), experiment.hash, experiment.seed, experiment.name,
+                  experiment.daemon.rate_hz,
+                  shadow ? ", shadow: commands are marked as not for the valves" : ""));
+  for (const std::string& warning : experiment_warnings(experiment))
+    say(fmt::format("softarmd: warning: {}\n", warning));
+  // A thread inherits the scheduling in force when it starts. The one that prints gets none of it;
+  // LCM's receive thread stays one below the tick, which a flood of messages would else starve.
+  ModeLog log;
+  RealtimeSettings below_tick = experiment.daemon.realtime;
+  below_tick.priority = std::max(1, below_tick.priority - 1);
+  for (const std::string& refused : apply_realtime_settings(below_tick))
+    say(fmt::format("softarmd: warning: {}\n", refused));
+  DaemonLoop loop(experiment, shadow, log);
+  apply_realtime_settings(experiment.daemon.realtime);  // what is refused was told above
   loop.run();
   print_summary(loop);
   return kExitOk;

@@ -220,6 +220,29 @@ TEST_F(Processes, HostileBytesAreCountedAndHarmless) {
   EXPECT_EQ(daemon->wait(1000ms), 0) << daemon->printed();
 }
 
+TEST_F(Processes, MessagesThatCannotBePrintedEndNothing) {
+  const Process plant("softarm-plant", {config_.string()}, "/dev/full");
+  Process daemon("softarmd", {config_.string()}, "/dev/full");
+  ASSERT_TRUE(wait_for([&] { return under_pressure(); }));
+  daemon.signal(SIGTERM);
+  EXPECT_EQ(daemon.wait(1000ms), 0);
+  EXPECT_TRUE(wait_for([&] { return plant_.vented != 0; }));
+}
+
+TEST_F(Processes, AStoppedAndContinuedPlantIsSimulatedOn) {
+  const auto plant = start("softarm-plant");
+  const auto daemon = start("softarmd");
+  ASSERT_TRUE(wait_for([&] { return under_pressure(); })) << daemon->printed();
+  plant->signal(SIGSTOP);
+  ASSERT_TRUE(wait_for([&] { return mode() == Mode::vent; })) << daemon->printed();
+  wait_for([] { return false; }, 1.0);
+  plant->signal(SIGCONT);
+  EXPECT_TRUE(wait_for([&] { return under_pressure(); })) << daemon->printed();
+  EXPECT_NE(plant->printed().find("behind real time"), std::string::npos) << plant->printed();
+  plant->signal(SIGTERM);
+  EXPECT_EQ(plant->wait(1000ms), 0) << plant->printed();
+}
+
 TEST_F(Processes, WatchRecordsWhatRunWouldWrite) {
   const auto plant = start("softarm-plant");
   const auto daemon = start("softarmd");
