@@ -51,7 +51,7 @@ struct LcmSettings {
   std::string status_channel = "SOFTARM_STATUS";
   std::string timing_channel = "SOFTARM_TIMING";
   std::string plant_channel = "SOFTARM_PLANT";  ///< a simulated arm's true state, for reports
-  double command_validity_s = 0.1;  ///< after which the valve side vents by itself
+  double command_validity_s = 0.1;              ///< after which the valve side vents by itself
 };
 
 /// Which bodies of the motion-capture frame carry the base and the segment ends.
