@@ -23,7 +23,8 @@ std::string quoted(const std::string& channel) {
   return pattern;
 }
 
-void dispatch(const lcm_recv_buf_t* packet, const char* /*channel*/, void* user) {
+/// noexcept: nothing may unwind through LCM's C code, where it would leave a lock behind.
+void dispatch(const lcm_recv_buf_t* packet, const char* /*channel*/, void* user) noexcept {
   // A packet with an unterminated channel name has been seen to claim 2^32 - 1 bytes.
   if (packet->data == nullptr || packet->data_size > kLargestMessage) return;
   const auto& handler = *static_cast<const LcmNode::Handler*>(user);

@@ -101,7 +101,9 @@ class Watch {
     const LcmSettings& lcm = experiment.daemon.lcm;
     node_.subscribe(lcm.status_channel, 1024, [this](const ReceivedMessage& p) { take_status(p); });
     node_.subscribe(lcm.plant_channel, 1024, [this](const ReceivedMessage& p) {
-      if (decode(p.bytes, plant_message_)) truth_.add(plant_message_);
+      // Of another arm on the channel nothing can be told.
+      if (decode(p.bytes, plant_message_) && plant_message_.num_segments == experiment_.arm.size())
+        truth_.add(plant_message_);
     });
     node_.subscribe(lcm.timing_channel, 8, [this](const ReceivedMessage& p) {
       timing_received_ |= decode(p.bytes, timing_);
