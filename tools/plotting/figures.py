@@ -156,6 +156,25 @@ def velocities(log, directory):
     return "velocities.png", "Velocity of u as the filter estimates it."
 
 
+def recording(log, directory):
+    """u, its velocity and what does not fit, in one picture: for a log of which no truth is known."""
+    if _has_truth(log) or log.velocity is None or log.twist_rad is None or log.segments > 1:
+        return None
+    panels = [("$u$ [rad]", log.u[:, 0]), (r"$\dot u$ [rad/s]", log.velocity[:, 0]),
+              ("twist [mrad]", 1e3 * log.twist_rad), ("chord error [mm]", 1e3 * log.length_m)]
+    figure, grid = _grid(len(panels), 1, row_height=1.4)
+    for row, (label, values) in zip(grid, panels):
+        t, values = thinned(log.t_s, values)
+        for k in range(values.shape[1]):
+            row[0].plot(t, values[:, k], linewidth=0.9, color=COMPONENT[k] if values.shape[1] == 2 else INK)
+        row[0].set_ylabel(label)
+    modes = time_axes(grid, log)
+    components = [Line2D([], [], color=COMPONENT[k], label=f"${axis}$ component") for k, axis in enumerate("xy")]
+    finish(figure, directory / "recording.png", "What the estimator makes of the recording", components + modes)
+    return "recording.png", ("Curvature u and its velocity; rotation about the axis that a segment of constant curvature "
+                             "does not have; measured minus expected chord.")
+
+
 def pressures(log, directory):
     """Pressures of every chamber: commanded, and real or measured."""
     shown = [s for s in _shown_segments(log)
@@ -327,4 +346,4 @@ def residuals(log, directory):
                              "expected chord, age of the newest frame at the tick, and when a limit cut the command.")
 
 
-ALL = (figure9, curvature, pressures, tip_path, residuals, velocities, tick_times)
+ALL = (figure9, curvature, recording, pressures, tip_path, residuals, velocities, tick_times)

@@ -192,7 +192,7 @@ class Watch {
   std::string progress_text() const {
     std::string text =
         fmt::format("{:6.1f} s {:<11} frame age {:4.1f} ms ",
-                    1e-6 * static_cast<double>(status_.time_us - start_us_),
+                    1e-6 * static_cast<double>(std::max(status_.time_us, start_us_) - start_us_),
                     name(static_cast<Mode>(status_.mode)), 1e3 * status_.frame_age_s);
     if (options_.duration_s > 0.0)
       text += fmt::format(" {:3.0f} %", 100.0 * active_s_ / options_.duration_s);
