@@ -1,4 +1,4 @@
-// SIGTERM and SIGINT ask a program to end in good order.
+// SIGTERM, SIGINT and SIGHUP ask a program to end in good order.
 #pragma once
 
 #include <csignal>
@@ -7,12 +7,14 @@ namespace softarm {
 
 inline volatile std::sig_atomic_t stop_requested = 0;
 
-/// From now on SIGTERM and SIGINT set `stop_requested` instead of ending the process.
+/// From now on SIGTERM, SIGINT and SIGHUP (a terminal that closes) set `stop_requested` instead of
+/// ending the process.
 inline void catch_stop_signals() noexcept {
   struct sigaction action {};
   action.sa_handler = [](int) { stop_requested = 1; };
   sigaction(SIGTERM, &action, nullptr);
   sigaction(SIGINT, &action, nullptr);
+  sigaction(SIGHUP, &action, nullptr);
 }
 
 /// A reader of our messages that goes away must not end us.
