@@ -1,6 +1,7 @@
 // softarm arm, softarm disarm: what a person asks of a running daemon.
 #include <fmt/format.h>
 
+#include <chrono>
 #include <memory>
 #include <softarm_messages/controller_status_t.hpp>
 #include <softarm_messages/operator_command_t.hpp>
@@ -33,9 +34,13 @@ int request(const std::string& config, std::int8_t what) {
   const std::int64_t start_ns = monotonic_now_ns();
   for (std::int64_t now_ns = start_ns; now_ns - start_ns < kPatience_ns;
        now_ns = monotonic_now_ns()) {
-    // Time as sequence number: it also counts up from one call of this command to the next.
+    // The date as sequence number: it counts up from one call to the next, also after a restart of
+    // this machine and from one machine to another, where the monotonic clock would not.
+    const std::int64_t date_ns = std::chrono::duration_cast<std::chrono::nanoseconds>(
+                                     std::chrono::system_clock::now().time_since_epoch())
+                                     .count();
     node.publish(lcm.operator_channel,
-                 softarm_messages::operator_command_t{.sequence = now_ns, .request = what});
+                 softarm_messages::operator_command_t{.sequence = date_ns, .request = what});
     const std::int64_t pause_end_ns = now_ns + 50'000'000;
     while (monotonic_now_ns() < pause_end_ns) node.wait_until(pause_end_ns);
     if (heard && ((status.flags & kArmedFlag) != 0) == wanted) {
