@@ -52,5 +52,5 @@ function(softarm_tests label room)
   target_compile_definitions(${target} PRIVATE
     SOFTARM_SOURCE_DIR="${PROJECT_SOURCE_DIR}" SOFTARM_BINARY_DIR="${PROJECT_BINARY_DIR}")
   gtest_discover_tests(${target} TEST_PREFIX "${label}.${room}." PROPERTIES LABELS ${label} TIMEOUT 300
-    RUN_SERIAL ${TESTS_ALONE} DISCOVERY_TIMEOUT 60)
+    RUN_SERIAL ${TESTS_ALONE} DISCOVERY_TIMEOUT 60 NO_PRETTY_TYPES NO_PRETTY_VALUES)
 endfunction()
