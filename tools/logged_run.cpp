@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <cstdio>
 #include <lcm/lcm-cpp.hpp>
 #include <stdexcept>
 
@@ -20,6 +21,7 @@ LoggedRun::LoggedRun(const Experiment& experiment, const std::filesystem::path& 
   if (!log_->good())
     throw std::runtime_error(fmt::format(
         "cannot read {}: is it an LCM log (softarm import, lcm-logger)?", log.string()));
+  size_bytes_ = static_cast<std::int64_t>(std::filesystem::file_size(log));
   if (!read_frame())
     throw std::runtime_error(fmt::format(
         "{} holds no frame on channel {}; daemon.lcm.mocap_channel says which to look for",
@@ -32,6 +34,7 @@ LoggedRun::~LoggedRun() = default;
 bool LoggedRun::read_frame() {
   softarm_messages::mocap_frame_t message;
   while (const lcm::LogEvent* event = log_->readNextEvent()) {
+    read_bytes_ = std::ftell(log_->getFilePtr());
     if (event->channel != experiment_.daemon.lcm.mocap_channel) continue;
     const auto* bytes = static_cast<const std::byte*>(event->data);
     if (!decode({bytes, static_cast<std::size_t>(event->datalen)}, message)) {

@@ -37,6 +37,12 @@ class LoggedRun {
   const DurationHistogram& tick_times() const { return tick_times_; }
   std::int64_t malformed() const { return malformed_; }
 
+  /// The log ended before its file did: from `read_bytes()` of `size_bytes()` on it is damaged or
+  /// cut.
+  bool damaged() const { return !has_next_ && read_bytes_ != size_bytes_; }
+  std::int64_t read_bytes() const { return read_bytes_; }
+  std::int64_t size_bytes() const { return size_bytes_; }
+
  private:
   bool read_frame();
 
@@ -52,6 +58,8 @@ class LoggedRun {
   std::int64_t start_ns_ = 0;
   std::int64_t ticks_ = 0;
   std::int64_t malformed_ = 0;
+  std::int64_t size_bytes_ = 0;
+  std::int64_t read_bytes_ = 0;
   DurationHistogram tick_times_;
 };
 

@@ -3,11 +3,13 @@
 #include <fmt/format.h>
 #include <softarm_commit.h>
 
+#include <cmath>
 #include <cstdio>
 #include <exception>
 #include <iostream>
 
 #include "softarm/config/config_error.hpp"
+#include "softarm/daemon/realtime.hpp"
 
 namespace softarm {
 namespace {
@@ -23,6 +25,9 @@ int parse_and_run(int argc, char** argv, CLI::App& app, const std::function<int(
   } catch (const ConfigError& error) {
     print_error(app.get_name(), error.what());
     return kExitConfiguration;
+  } catch (const OtherInstance& error) {
+    print_error(app.get_name(), error.what());
+    return kExitOtherInstance;
   } catch (const std::exception& error) {
     print_error(app.get_name(), error.what());
     return kExitFailure;
@@ -35,6 +40,17 @@ const char* version_text() noexcept { return SOFTARM_VERSION; }
 const char* commit_text() noexcept { return SOFTARM_COMMIT; }
 
 void say(const std::string& text) noexcept { std::fputs(text.c_str(), stderr); }
+
+CLI::Validator positive_seconds() {
+  const auto check = [](std::string& text) -> std::string {
+    double seconds = 0.0;
+    const bool number = CLI::detail::lexical_cast(text, seconds);
+    return number && std::isfinite(seconds) && seconds > 0.0
+               ? std::string()
+               : fmt::format("expected seconds above zero, got {}", text);
+  };
+  return {check, "SECONDS"};
+}
 
 void print_error(const std::string& program, const std::string& message) {
   say(fmt::format("{}: error: {}\n", program, message));

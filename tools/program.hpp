@@ -25,6 +25,9 @@ const char* commit_text() noexcept;
 /// moves an arm may end for that.
 void say(const std::string& text) noexcept;
 
+/// Accepts a finite time above zero, in s.
+CLI::Validator positive_seconds();
+
 /// Prints "NAME: error: MESSAGE" on stderr.
 void print_error(const std::string& program, const std::string& message);
 

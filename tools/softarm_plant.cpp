@@ -134,6 +134,8 @@ class PlantProcess {
 
 int serve(const std::string& path) {
   const Experiment experiment = load_experiment(path);
+  const LcmSettings& lcm = experiment.daemon.lcm;
+  const InstanceLock lock(lcm.mocap_channel + " on " + lcm.url);
   catch_stop_signals();
   ignore_broken_pipes();
   say(fmt::format(

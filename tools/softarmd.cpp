@@ -22,6 +22,9 @@ class ModeLog {
  public:
   ModeLog() : thread_([this](const std::stop_token& stop) { print_until(stop); }) {}
 
+  /// Prints what is still to be printed and ends the thread.
+  void finish() { thread_ = {}; }
+
   void add(std::int64_t since_start_ns, Mode mode, Reason reason) noexcept {
     const std::size_t head = head_.load(std::memory_order_relaxed);
     if (head - tail_.load(std::memory_order_acquire) == kCapacity) {
@@ -167,13 +170,7 @@ int serve(const std::string& path, bool shadow) {
   const Experiment experiment = load_experiment(path);
   const LcmSettings& lcm = experiment.daemon.lcm;
   const std::string channel = lcm.command_channel + (shadow ? " (shadow)" : "");
-  std::unique_ptr<InstanceLock> lock;
-  try {
-    lock = std::make_unique<InstanceLock>(channel + " on " + lcm.url);
-  } catch (const std::runtime_error& error) {
-    print_error("softarmd", error.what());
-    return kExitOtherInstance;
-  }
+  const InstanceLock lock(channel + " on " + lcm.url);
   catch_stop_signals();
   ignore_broken_pipes();
 
@@ -193,6 +190,7 @@ int serve(const std::string& path, bool shadow) {
   DaemonLoop loop(experiment, shadow, log);
   apply_realtime_settings(experiment.daemon.realtime);  // what is refused was told above
   loop.run();
+  log.finish();
   print_summary(loop);
   return kExitOk;
 }

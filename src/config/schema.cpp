@@ -134,12 +134,12 @@ void describe_actuation(SchemaVisitor& visitor, ActuationSettings& actuation, in
        given ? Presence::optional : kRequired},
       segments, all_equal,
       [&](int i) { describe_chambers(visitor, actuation.segments[static_cast<std::size_t>(i)]); });
-  visitor.number({"min_pressure_bar", "bar", "lowest commanded pressure", from_to(-1.0, 100.0)},
+  visitor.number({"min_pressure_bar", "bar", "lowest commanded pressure", from_to(0.0, 100.0)},
                  actuation.min_pressure_bar);
   visitor.number({"max_pressure_bar", "bar", "highest commanded pressure", above_to(0.0, 100.0)},
                  actuation.max_pressure_bar);
   visitor.number({"bias_pressure_bar", "bar", "where pressures rest that no torque asks to move",
-                  from_to(-1.0, 100.0)},
+                  from_to(0.0, 100.0)},
                  actuation.bias_pressure_bar);
   visitor.number(
       {"slew_bar_per_s", "bar/s", "largest rate of a commanded pressure", above_to(0.0, kMany)},

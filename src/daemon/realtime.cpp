@@ -70,9 +70,9 @@ InstanceLock::InstanceLock(const std::string& name) {
   if (socket_ < 0 || bind(socket_, reinterpret_cast<const sockaddr*>(&address), size) != 0) {
     const int error = errno;
     if (socket_ >= 0) close(socket_);
-    throw std::runtime_error(error == EADDRINUSE
-                                 ? "another instance already serves " + name + "; stop it first"
-                                 : "cannot lock " + name + ": " + std::strerror(error));
+    if (error == EADDRINUSE)
+      throw OtherInstance("another instance already serves " + name + "; stop it first");
+    throw std::runtime_error("cannot lock " + name + ": " + std::strerror(error));
   }
 }
 

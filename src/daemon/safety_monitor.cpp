@@ -95,8 +95,10 @@ SafetyThresholds resolve_thresholds(const SafetySettings& settings,
                             ? settings.hold_after_s
                             : std::max(3.0 * control_period_s,
                                        3.0 * settings.frame_period_s + settings.frame_latency_s);
-  const double vent_s = settings.vent_after_s > 0.0 ? settings.vent_after_s
-                                                    : std::max(0.1, 10.0 * settings.frame_period_s);
+  const double vent_s =
+      settings.vent_after_s > 0.0
+          ? settings.vent_after_s
+          : std::max({0.1, 10.0 * settings.frame_period_s, 3.0 * control_period_s});
   return {.hold_after_ns = std::llround(hold_s * 1e9), .vent_after_ns = std::llround(vent_s * 1e9)};
 }
 
@@ -119,16 +121,17 @@ SafetyMonitor::Verdict SafetyMonitor::worst_cause(const SafetyInput& input) cons
   return {Mode::active, Reason::none};
 }
 
-void SafetyMonitor::take_operator_requests(const SafetyInput& input) noexcept {
-  if (input.arm) armed_ = true;
+void SafetyMonitor::take_operator_requests(const SafetyInput& input, Mode demanded) noexcept {
+  // Armed is granted for what the operator sees now, never stored up for when a cause has gone.
+  if (input.arm && demanded < Mode::vent) armed_ = true;
   if (input.disarm || input.shutdown) armed_ = false;
 }
 
 void SafetyMonitor::enter(Mode mode, Reason reason) noexcept {
-  // A vent or a fault takes the arming back; what is lost with the arm's position must be granted
-  // anew.
-  if (mode >= Mode::vent && mode_ < Mode::vent && settings_.arming == Arming::explicit_)
-    armed_ = false;
+  // A vent or a fault takes the arming back. With automatic arming it comes back by itself, but not
+  // to an arm that ran beyond its limits: it would do so again and again.
+  const bool always = mode == Mode::fault || reason == Reason::soft_limit;
+  if (mode >= Mode::vent && (always || settings_.arming == Arming::explicit_)) armed_ = false;
   mode_ = mode;
   reason_ = reason;
 }
@@ -146,14 +149,15 @@ void SafetyMonitor::try_to_activate(const SafetyInput& input, Reason otherwise) 
 }
 
 Mode SafetyMonitor::step(const SafetyInput& input) noexcept {
-  take_operator_requests(input);
   const Verdict verdict = worst_cause(input);
+  take_operator_requests(input, verdict.demands);
   previous_tick_ns_ = input.now_ns;
   if (mode_ == Mode::init) enter(Mode::wait_frames, Reason::waiting_for_frames);
 
-  // Good frames count only while nothing is wrong: a run is a run without a cause, a rejection or a
-  // gap.
-  if (verdict.demands > Mode::active || input.bad_frames > 0) {
+  // A run of good frames is one without a cause, a rejection or a gap, and begins anew with the arm
+  // vented: until then it is moving.
+  const bool still_venting = mode_ == Mode::vent && !input.fully_vented;
+  if (verdict.demands > Mode::active || input.bad_frames > 0 || still_venting) {
     good_in_a_row_ = 0;
   } else {
     good_in_a_row_ = std::min(good_in_a_row_ + input.good_frames, settings_.good_frames);

@@ -15,8 +15,8 @@ constexpr int kFrameCapacity =
 constexpr int kOtherCapacity = 16;
 constexpr int kMessagesPerTick = kFrameCapacity + 3 * kOtherCapacity;
 constexpr auto kNever = std::numeric_limits<std::int64_t>::min();
-/// After so long a silence a sender of references may begin its numbers anew.
-constexpr std::int64_t kReferenceForgotten_ns = 500'000'000;
+/// After so long a silence a sender of references or requests may begin its numbers anew.
+constexpr std::int64_t kNumberForgotten_ns = 500'000'000;
 
 std::int64_t wall_clock_ns() noexcept {
   timespec now{};
@@ -137,7 +137,7 @@ void DaemonLink::take_reference(const ReceivedMessage& packet) noexcept {
     ++malformed_;
     return;
   }
-  const bool forgotten = now_ns_ - newest_reference_ns_ > kReferenceForgotten_ns;
+  const bool forgotten = now_ns_ - newest_reference_ns_ > kNumberForgotten_ns;
   if (reference_message_.sequence <= reference_sequence_ && !forgotten) return;
   reference_sequence_ = reference_message_.sequence;
   newest_reference_ns_ = now_ns_;
@@ -154,8 +154,10 @@ void DaemonLink::take_operator(const ReceivedMessage& packet) noexcept {
     ++malformed_;
     return;
   }
-  const bool newer = operator_message_.sequence > operator_sequence_;
+  const bool newer = operator_message_.sequence > operator_sequence_ ||
+                     now_ns_ - newest_operator_ns_ > kNumberForgotten_ns;
   if (newer) operator_sequence_ = operator_message_.sequence;
+  newest_operator_ns_ = now_ns_;
   // Whoever wants the arm vented is right, whatever the number; so is a request nobody knows.
   const bool arm = operator_message_.request == softarm_messages::operator_command_t::ARM;
   input_.disarm |= !arm;

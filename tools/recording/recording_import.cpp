@@ -17,6 +17,8 @@
 namespace softarm {
 namespace {
 
+constexpr double kMostRestSpread_m = 2e-3;  ///< an arm that moves more is not at rest
+
 struct Pose {
   Eigen::Vector3d position_m;
   Eigen::Quaterniond orientation;
@@ -156,6 +158,13 @@ class Importer {
       const double away = (body_in(table_, row, body, map_, z_up_)->position_m - position).norm();
       summary_.rest_spread_m = std::max(summary_.rest_spread_m, away);
     }
+    if (summary_.rest_spread_m > kMostRestSpread_m)
+      throw std::runtime_error(
+          fmt::format("the arm moves by {:.1f} mm in the rest window of {} to {} s: expected less "
+                      "than {:.0f} mm; "
+                      "give rest.from_s and rest.to_s a window in which it hangs still",
+                      1e3 * summary_.rest_spread_m, map_.rest->from_s, map_.rest->to_s,
+                      1e3 * kMostRestSpread_m));
     return {position, Eigen::Quaterniond(Eigen::Vector4d(orientation.normalized()))};
   }
 

@@ -89,19 +89,20 @@ int run(const RunOptions& options) {
 
   TrackingSummary summary(experiment.arm.size(), experiment.run.tracking_from_s);
   TimingReport timing;
-  const auto record_and_report = [&](auto stepper) {
+  const auto record_and_report = [&](auto& stepper) {
     ExperimentLog log(options.out, experiment);
-    const std::int64_t took_ns = record(*stepper, duration_s, period_s, log, summary);
+    const std::int64_t took_ns = record(stepper, duration_s, period_s, log, summary);
     log.close();
     timing.real_time_factor =
         1e9 * summary.duration_s() / static_cast<double>(std::max<std::int64_t>(1, took_ns));
-    timing.histograms = {
-        {"tick_us", stepper->tick_times().counts(), stepper->tick_times().max_us()}};
+    timing.histograms = {{"tick_us", stepper.tick_times().counts(), stepper.tick_times().max_us()}};
   };
+  std::unique_ptr<LoggedRun> logged;
   if (options.mocap_log.empty()) {
-    record_and_report(std::make_unique<LockStep>(experiment));
+    record_and_report(*std::make_unique<LockStep>(experiment));
   } else {
-    record_and_report(std::make_unique<LoggedRun>(experiment, options.mocap_log));
+    logged = std::make_unique<LoggedRun>(experiment, options.mocap_log);
+    record_and_report(*logged);
   }
   const std::filesystem::path out(options.out);
   write_text(out / "summary.json", summary.json());
@@ -109,6 +110,12 @@ int run(const RunOptions& options) {
   fmt::print("{}{:.0f} times faster than real time; log, summary and timing are in {}\n",
              summary.table(), timing.real_time_factor, options.out);
   if (options.plots) plot(options.out);
+  if (logged && logged->damaged()) {
+    print_error("softarm",
+                fmt::format("{} is damaged or cut at byte {} of {}; what precedes it was used",
+                            options.mocap_log, logged->read_bytes(), logged->size_bytes()));
+    return kExitFailure;
+  }
   return kExitOk;
 }
 
@@ -125,7 +132,7 @@ void add_run_command(CLI::App& app) {
   command
       ->add_option("--duration", options->duration_s,
                    "simulated time in s (default: run.duration_s)")
-      ->check(CLI::PositiveNumber);
+      ->check(positive_seconds());
   command->add_option("--mocap", options->mocap_log,
                       "take the frames from this LCM log instead of the simulated arm");
   command->add_flag("!--no-plots", options->plots, "do not draw the plots");

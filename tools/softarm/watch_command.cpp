@@ -194,6 +194,8 @@ class Watch {
         fmt::format("{:6.1f} s {:<11} frame age {:4.1f} ms ",
                     1e-6 * static_cast<double>(std::max(status_.time_us, start_us_) - start_us_),
                     name(static_cast<Mode>(status_.mode)), 1e3 * status_.frame_age_s);
+    if (static_cast<Mode>(status_.mode) != Mode::active)
+      text += fmt::format(" ({})", name(static_cast<Reason>(status_.reason)));
     if (options_.duration_s > 0.0)
       text += fmt::format(" {:3.0f} %", 100.0 * active_s_ / options_.duration_s);
     const int shown = std::min<int>(status_.num_segments, 4);
@@ -268,7 +270,7 @@ void add_watch_command(CLI::App& app) {
   command
       ->add_option("--duration", options->duration_s,
                    "stop after so many seconds of ACTIVE (default: at Ctrl-C)")
-      ->check(CLI::PositiveNumber);
+      ->check(positive_seconds());
   command->callback([options] {
     if (const int code = watch(*options); code != kExitOk) throw CLI::RuntimeError(code);
   });

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -42,11 +43,16 @@ class PeriodicDeadline {
   std::int64_t next_ns_;
 };
 
+/// Another process holds the lock.
+class OtherInstance : public std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
 /// Held for the life of the process: keeps a second instance away from the same name. No file is
 /// left behind.
 class InstanceLock {
  public:
-  /// @throws std::runtime_error if another process holds the lock, or none can be taken
+  /// @throws OtherInstance; std::runtime_error if no lock can be taken at all
   explicit InstanceLock(const std::string& name);
   ~InstanceLock();
   InstanceLock(const InstanceLock&) = delete;

@@ -74,7 +74,8 @@ struct SafetyInput {
 
 /// Reads no clock, allocates nothing, throws nothing. Transitions follow the severity of the causes
 /// present: the most severe wins; HOLD and VENT are left for ACTIVE only by `good_frames` good
-/// frames in a row, VENT also only once fully vented and, with explicit arming, armed anew.
+/// frames in a row, after VENT counted from when the arm is fully vented. With explicit arming a
+/// VENT must be armed anew; with automatic arming only one for a soft limit, and a fault.
 class SafetyMonitor {
  public:
   SafetyMonitor(const SafetySettings& settings, double control_period_s) noexcept;
@@ -92,7 +93,7 @@ class SafetyMonitor {
     Reason reason;
   };
   Verdict worst_cause(const SafetyInput& input) const noexcept;
-  void take_operator_requests(const SafetyInput& input) noexcept;
+  void take_operator_requests(const SafetyInput& input, Mode demanded) noexcept;
   void enter(Mode mode, Reason reason) noexcept;
   void try_to_activate(const SafetyInput& input, Reason otherwise) noexcept;
 

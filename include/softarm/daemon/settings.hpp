@@ -21,7 +21,7 @@ struct SafetySettings {
   double frame_period_s = 0.005;  ///< nominal, of the motion capture
   double frame_latency_s = 0.0;   ///< declared, from capture to arrival
   double hold_after_s = 0.0;      ///< 0: max(3 T, 3 frame periods + declared latency)
-  double vent_after_s = 0.0;      ///< 0: max(100 ms, 10 frame periods)
+  double vent_after_s = 0.0;      ///< 0: max(100 ms, 10 frame periods, 3 T)
   int good_frames = 50;           ///< in a row, before HOLD or VENT is left
   double max_latency_s = 0.05;    ///< later frames count as stale
   int frozen_frames = 100;  ///< identical poses in a row while the command changes; 0: not checked

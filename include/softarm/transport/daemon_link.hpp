@@ -79,6 +79,7 @@ class DaemonLink {
   std::int64_t previous_collect_ns_ = 0;
   std::int64_t newest_measurement_ns_;
   std::int64_t newest_reference_ns_ = 0;
+  std::int64_t newest_operator_ns_ = 0;
   std::int64_t reference_sequence_;
   std::int64_t operator_sequence_;
   std::int64_t malformed_ = 0;

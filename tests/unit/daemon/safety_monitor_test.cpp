@@ -99,7 +99,31 @@ TEST(SafetyMonitor, SilenceHoldsThenVentsAndComesBack) {
   bench.frames_per_tick = 1;
   EXPECT_EQ(bench.run(200), Mode::vent) << "must not leave before it is fully vented";
   bench.input.fully_vented = true;
+  EXPECT_EQ(bench.run(49), Mode::vent) << "the arm swings until it has been vented for a while";
   EXPECT_EQ(bench.run(1), Mode::active);
+}
+
+TEST(SafetyMonitor, ASoftLimitIsNotForgivenAutomatically) {
+  Bench bench;
+  bench.activate();
+  bench.input.soft_limit_exceeded = true;
+  ASSERT_EQ(bench.tick(), Mode::vent);
+  bench.input.soft_limit_exceeded = false;
+  bench.input.fully_vented = true;
+  EXPECT_EQ(bench.run(1000), Mode::vent);
+  EXPECT_EQ(bench.monitor.reason(), Reason::waiting_for_arm);
+  bench.input.arm = true;
+  EXPECT_EQ(bench.tick(), Mode::active);
+}
+
+TEST(SafetyMonitor, ArmingIsNotStoredUpForLater) {
+  Bench bench(Arming::explicit_);
+  bench.input.fully_vented = true;
+  bench.frames_per_tick = 0;
+  bench.input.arm = true;
+  bench.tick();
+  bench.frames_per_tick = 1;
+  EXPECT_EQ(bench.run(200), Mode::wait_frames) << "armed when nobody could see the arm";
 }
 
 TEST(SafetyMonitor, HoldEndsAfterFiftyGoodFrames) {
@@ -120,6 +144,7 @@ TEST(SafetyMonitor, VentTakesTheArmingBack) {
   ASSERT_EQ(bench.tick(), Mode::active);
   bench.input.sender_restarted = true;
   EXPECT_EQ(bench.tick(), Mode::vent);
+  bench.input.fully_vented = true;
   EXPECT_EQ(bench.run(500), Mode::vent);
   EXPECT_EQ(bench.monitor.reason(), Reason::waiting_for_arm);
   bench.input.arm = true;
@@ -196,7 +221,7 @@ TEST(SafetyMonitor, RandomSequencesNeverBreakTheInvariants) {
     Mode before = Mode::init;
     for (int k = 0; k < 1000; ++k) {
       if (chance(0.01)) bench.frames_per_tick = 1 - bench.frames_per_tick;
-      bench.input.fully_vented = chance(0.5);
+      if (chance(0.01)) bench.input.fully_vented = !bench.input.fully_vented;
       bench.input.poses_frozen = chance(0.005);
       bench.input.sender_restarted = chance(0.002);
       bench.input.arm = chance(0.02);
