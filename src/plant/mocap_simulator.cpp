@@ -29,7 +29,8 @@ const MocapSettings& checked(const MocapSettings& settings, int segments) {
          "a finite angle >= 0", settings.orientation_noise_rad);
   expect(settings.dropout_probability >= 0.0 && settings.dropout_probability <= 1.0,
          "dropout_probability", "a probability", settings.dropout_probability);
-  expect(segments >= 1 && segments <= kMaxSegments, "segments", "1..64 segments", segments);
+  expect(segments >= 1 && segments <= kMaxSegments, "segments",
+         ("1.." + std::to_string(kMaxSegments) + " segments").c_str(), segments);
   return settings;
 }
 

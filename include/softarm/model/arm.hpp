@@ -9,7 +9,7 @@ namespace softarm {
 
 /// Capacity of the fixed-size types used inside the control loop; the number of segments itself is
 /// chosen at run time.
-inline constexpr int kMaxSegments = 64;
+inline constexpr int kMaxSegments = 128;
 
 /// Two numbers a segment, [u1_x, u1_y, u2_x, u2_y, ...]. Run-time size, storage in place: copying
 /// it never allocates.

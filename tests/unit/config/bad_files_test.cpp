@@ -59,7 +59,7 @@ const Spoilt kSpoilt[] = {
     // wrong type
     {"seed: 7", "seed: seven", "seed", "\"seven\""},
     {"seed: 7", "seed: 7.5", "seed", "whole number"},
-    {"  segments: 2", "  segments: two", "arm.segments", "whole number in [1, 64]"},
+    {"  segments: 2", "  segments: two", "arm.segments", "whole number in [1, 128]"},
     {"  mass_kg: 0.15", "  mass_kg: \"0.15\"", "arm.mass_kg", "in quotes"},
     {"  mass_kg: 0.15", "  mass_kg: 0.15 kg", "arm.mass_kg", "\"0.15 kg\""},
     {"  mass_kg: 0.15", "  mass_kg: 0,15", "arm.mass_kg", "\"0,15\""},
@@ -97,8 +97,8 @@ const Spoilt kSpoilt[] = {
     {"  kd_nms_per_rad: 0.002", "  kd_nms_per_rad: .inf", "control.kd_nms_per_rad", "\".inf\""},
     {"[0, 0, -9.81]", "[0, .NaN, -9.81]", "arm.gravity_mps2[1]", "\".NaN\""},
     // out of range
-    {"  segments: 2", "  segments: 0", "arm.segments", "[1, 64]"},
-    {"  segments: 2", "  segments: 65", "arm.segments", "[1, 64]"},
+    {"  segments: 2", "  segments: 0", "arm.segments", "[1, 128]"},
+    {"  segments: 2", "  segments: 129", "arm.segments", "[1, 128]"},
     {"[0.11, 0.12]", "[0.11, 0]", "arm.length_m[1]", "(0, 10] m"},
     {"  mass_kg: 0.15", "  mass_kg: -0.15", "arm.mass_kg", "(0, 100] kg"},
     {"seed: 7", "seed: -1", "seed", "whole number in [0,"},

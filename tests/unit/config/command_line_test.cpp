@@ -66,7 +66,7 @@ TEST_F(CommandLine, WrongConfigurationIs78) {
   const auto file = folder_.write("bad.yaml", "name: bad\narm: {segments: 0}\n");
   const Outcome bad = run("check '" + file.string() + "'");
   EXPECT_EQ(bad.code, 78);
-  EXPECT_NE(bad.err.find(file.string() + ":2: arm.segments: expected a whole number in [1, 64]"),
+  EXPECT_NE(bad.err.find(file.string() + ":2: arm.segments: expected a whole number in [1, 128]"),
             std::string::npos)
       << bad.err;
 }
