@@ -3,10 +3,10 @@
 #include <cmath>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 #include "plant/arkode_integrator.hpp"
-#include "plant/pcc_system.hpp"
-#include "softarm/model/kinematics.hpp"
+#include "plant/plant_system.hpp"
 
 namespace softarm {
 namespace {
@@ -49,6 +49,8 @@ const PlantSettings& checked(const PlantSettings& settings) {
            "damping >= 0 N m s/rad", std::to_string(segment.damping_nms_per_rad));
   }
   for (const auto& segment : settings.actuation.segments) {
+    expect(settings.actuation.kind != ActuationKind::torque || segment.size() == 2,
+           "two moments a segment", std::to_string(segment.size()));
     for (const Chamber& chamber : segment) {
       expect(std::isfinite(chamber.angle_rad) && std::isfinite(chamber.gain_nm_per_bar),
              "finite chamber angles and gains", "others");
@@ -62,6 +64,13 @@ const PlantSettings& checked(const PlantSettings& settings) {
 Eigen::MatrixXd chamber_map(const ActuationSettings& actuation) {
   Eigen::MatrixXd map = Eigen::MatrixXd::Zero(
       2 * static_cast<Eigen::Index>(actuation.segments.size()), count_chambers(actuation));
+  if (actuation.kind == ActuationKind::torque) {
+    for (Eigen::Index row = 0; row < map.rows(); row += 2) {
+      map(row, row + 1) = 1.0;  // A_chamber itself
+      map(row + 1, row) = -1.0;
+    }
+    return map;
+  }
   Eigen::Index column = 0;
   Eigen::Index row = 0;
   for (const auto& segment : actuation.segments) {
@@ -89,34 +98,39 @@ struct ArmPlant::Implementation {
   explicit Implementation(const PlantSettings& settings)
       : arm(checked(settings).arm),
         lag_s(settings.valves.lag_s),
-        valves(settings.valves, count_chambers(settings.actuation)),
+        valves(settings.valves, count_chambers(settings.actuation),
+               settings.actuation.kind == ActuationKind::torque),
         map(chamber_map(settings.actuation)),
-        system(settings),
-        integrator(system, integrator_settings(settings)),
+        system(make_plant_system(settings)),
+        integrator(*system, integrator_settings(settings)),
         present_nm(Eigen::VectorXd::Zero(arm.dof())),
-        target_nm(Eigen::VectorXd::Zero(arm.dof())) {
+        target_nm(Eigen::VectorXd::Zero(arm.dof())),
+        ends(static_cast<std::size_t>(arm.size())) {
     Eigen::VectorXd u = Eigen::VectorXd::Zero(arm.dof());
     if (settings.initial_u_rad.size() > 0) {
       u = settings.initial_u_rad;
     }
     drive();
-    integrator.reset(0.0, u, Eigen::VectorXd::Zero(arm.dof()));
+    Eigen::VectorXd x(system->size());
+    system->spread(u, x);
+    integrator.reset(0.0, x, Eigen::VectorXd::Zero(x.size()));
   }
 
   /// Tells the equation of motion what the valves will do from now on.
   void drive() {
     present_nm.noalias() = map * valves.pressures_bar();
     target_nm.noalias() = map * valves.commanded_bar();
-    system.drive(integrator.time_s(), present_nm, target_nm, lag_s);
+    system->drive(integrator.time_s(), present_nm, target_nm, lag_s);
   }
 
   ArmParameters arm;
   double lag_s;
   Valves valves;
   Eigen::MatrixXd map;
-  mutable PccSystem system;  // energies use its workspace
+  std::unique_ptr<PlantSystem> system;
   ArkodeIntegrator integrator;
   Eigen::VectorXd present_nm, target_nm;
+  mutable std::vector<Eigen::Isometry3d> ends;
 };
 
 ArmPlant::ArmPlant(const PlantSettings& settings)
@@ -125,6 +139,7 @@ ArmPlant::~ArmPlant() = default;
 ArmPlant::ArmPlant(ArmPlant&&) noexcept = default;
 ArmPlant& ArmPlant::operator=(ArmPlant&&) noexcept = default;
 
+int ArmPlant::dof() const noexcept { return implementation_->system->size(); }
 int ArmPlant::segments() const noexcept { return implementation_->arm.size(); }
 int ArmPlant::chambers() const noexcept { return implementation_->valves.size(); }
 
@@ -161,12 +176,37 @@ void ArmPlant::reset(ConstVectorRef u_rad, ConstVectorRef velocity_radps,
   expect(u_rad.allFinite() && velocity_radps.allFinite(), "a finite state", "another");
   self.valves.reset(pressure_bar);
   self.drive();
-  self.integrator.reset(self.integrator.time_s(), u_rad, velocity_radps);
+  Eigen::VectorXd x(self.system->size());
+  Eigen::VectorXd v(self.system->size());
+  self.system->spread(u_rad, x);
+  self.system->spread(velocity_radps, v);
+  self.integrator.reset(self.integrator.time_s(), x, v);
 }
 
 double ArmPlant::time_s() const noexcept { return implementation_->integrator.time_s(); }
-SegmentVector ArmPlant::u_rad() const noexcept { return implementation_->integrator.x(); }
-SegmentVector ArmPlant::velocity_radps() const noexcept { return implementation_->integrator.v(); }
+Eigen::VectorXd ArmPlant::coordinates() const noexcept { return implementation_->integrator.x(); }
+Eigen::VectorXd ArmPlant::coordinate_rates() const noexcept {
+  return implementation_->integrator.v();
+}
+
+void ArmPlant::curvature(SegmentVector& u_rad, SegmentVector& velocity_radps) const noexcept {
+  const Implementation& self = *implementation_;
+  u_rad.resize(self.arm.dof());
+  velocity_radps.resize(self.arm.dof());
+  self.system->curvature(self.integrator.x(), self.integrator.v(), u_rad, velocity_radps);
+}
+
+SegmentVector ArmPlant::u_rad() const noexcept {
+  SegmentVector u, velocity;
+  curvature(u, velocity);
+  return u;
+}
+
+SegmentVector ArmPlant::velocity_radps() const noexcept {
+  SegmentVector u, velocity;
+  curvature(u, velocity);
+  return velocity;
+}
 
 const Eigen::VectorXd& ArmPlant::pressures_bar() const noexcept {
   return implementation_->valves.pressures_bar();
@@ -183,17 +223,18 @@ Eigen::Isometry3d ArmPlant::base() const noexcept {
 }
 
 void ArmPlant::segment_ends(std::span<Eigen::Isometry3d> segment_ends) const noexcept {
-  forward_kinematics(implementation_->arm, implementation_->integrator.x(), segment_ends);
+  implementation_->system->segment_ends(implementation_->integrator.x(), segment_ends);
 }
 
 Eigen::Vector3d ArmPlant::tip_m() const noexcept {
-  return tip_position(implementation_->arm, implementation_->integrator.x());
+  segment_ends(implementation_->ends);
+  return implementation_->ends.back().translation();
 }
 
 PlantEnergies ArmPlant::energies() const noexcept {
   const Implementation& self = *implementation_;
-  return {.kinetic = self.system.kinetic_energy_j(self.integrator.x(), self.integrator.v()),
-          .potential = self.system.potential_energy_j(self.integrator.x()),
+  return {.kinetic = self.system->kinetic_energy_j(self.integrator.x(), self.integrator.v()),
+          .potential = self.system->potential_energy_j(self.integrator.x()),
           .supplied = self.integrator.supplied_j(),
           .dissipated = self.integrator.dissipated_j()};
 }

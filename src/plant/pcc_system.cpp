@@ -3,58 +3,63 @@
 #include <cmath>
 
 #include "softarm/model/actuation_matrix.hpp"
+#include "softarm/model/kinematics.hpp"
+#include "softarm/model/segment.hpp"
 
 namespace softarm {
 
 PccSystem::PccSystem(const PlantSettings& settings)
-    : arm_(settings.arm),
+    : segments_(settings.arm.size()),
+      pieces_(settings.kind == PlantKind::refined ? settings.refined.pieces : 1),
+      arm_(pieces_of(settings)),
+      share_(arm_.size()),
       tip_force_n_(settings.tip_force_n),
       has_tip_force_(settings.tip_force_n != Eigen::Vector3d::Zero()),
-      workspace_(settings.arm) {
+      workspace_(arm_),
+      input_(settings.arm.dof()),
+      piece_ends_(static_cast<std::size_t>(arm_.size())) {
   const Eigen::Index n = arm_.dof();
-  for (Eigen::VectorXd* vector : {&stiffness_, &damping_, &target_nm_, &excess_nm_, &force_nm_,
-                                  &shifted_, &above_, &below_, &sum_}) {
+  for (Eigen::VectorXd* vector : {&stiffness_, &damping_, &shifted_, &above_, &below_, &sum_}) {
     vector->setZero(n);
   }
   coriolis_.setZero(n, n);
-  for (int i = 0; i < arm_.size(); ++i) {
-    const SegmentParameters& segment = arm_.segments[static_cast<std::size_t>(i)];
-    stiffness_.segment<2>(2 * i).setConstant(segment.stiffness_nm_per_rad);
-    damping_.segment<2>(2 * i).setConstant(segment.damping_nms_per_rad);
+  for (int j = 0; j < arm_.size(); ++j) {
+    const SegmentParameters& piece = arm_.segments[static_cast<std::size_t>(j)];
+    const SegmentParameters& whole = settings.arm.segments[static_cast<std::size_t>(j / pieces_)];
+    stiffness_.segment<2>(2 * j).setConstant(piece.stiffness_nm_per_rad);
+    damping_.segment<2>(2 * j).setConstant(piece.damping_nms_per_rad);
+    // A segment without stiffness bends under no moment in particular: equally, then.
+    share_[j] = pieces_ == 1 ? 1.0
+                : piece.stiffness_nm_per_rad > 0.0
+                    ? whole.stiffness_nm_per_rad / piece.stiffness_nm_per_rad
+                    : 1.0 / pieces_;
   }
 }
 
-void PccSystem::drive(double t_s, ConstVector present_nm, ConstVector target_nm, double lag_s) {
-  target_nm_ = target_nm;
-  excess_nm_ = present_nm - target_nm;
-  since_s_ = t_s;
-  rate_per_s_ = lag_s > 0.0 ? 1.0 / lag_s : 0.0;
-  force_known_ = false;
-}
-
-const Eigen::VectorXd& PccSystem::chamber_force(double t_s) {
-  if (!force_known_ || (rate_per_s_ > 0.0 && t_s != force_time_s_)) {
-    force_nm_ = target_nm_;
-    if (rate_per_s_ > 0.0) {
-      force_nm_ += std::exp(-(t_s - since_s_) * rate_per_s_) * excess_nm_;
-    }
-    force_time_s_ = t_s;
-    force_known_ = true;
+void PccSystem::add_couple(const Eigen::Vector2d& tau_nm, int first_piece, ConstVector u,
+                           Vector out) const {
+  Eigen::Vector3d local(tau_nm.x(), tau_nm.y(), 0.0);  // in the axes of the piece's start
+  for (int j = first_piece; j < first_piece + pieces_; ++j) {
+    const Eigen::Vector2d bend = u.segment<2>(2 * j);
+    out.segment<2>(2 * j) += segment_angular_jacobian(bend).transpose() * local;
+    local = segment_rotation(bend).transpose() * local;
   }
-  return force_nm_;
 }
 
 void PccSystem::add_input(double t_s, ConstVector u, Vector out) {
-  const Eigen::VectorXd& force = chamber_force(t_s);
-  if (arm_.actuation == ActuationModel::chamber) {
-    out += force;
-  } else {
-    for (int i = 0; i < arm_.size(); ++i) {
-      // The moments about the segment's own axes that its chambers make, through the other input
-      // matrix.
-      const Eigen::Vector2d tau_actuation(-force[2 * i + 1], force[2 * i]);
+  const bool couple = arm_.actuation == ActuationModel::couple;
+  const Eigen::VectorXd& force = input_.force_nm(t_s);
+  for (int i = 0; i < segments_; ++i) {
+    const int first = i * pieces_;
+    if (!couple) {
+      for (int j = first; j < first + pieces_; ++j) {
+        out.segment<2>(2 * j) += force.segment<2>(2 * i);
+      }
+    } else if (pieces_ == 1) {
       out.segment<2>(2 * i) +=
-          actuation_matrix(arm_.actuation, u.segment<2>(2 * i)) * tau_actuation;
+          actuation_matrix(arm_.actuation, u.segment<2>(2 * i)) * input_.tau_nm(t_s, i);
+    } else {
+      add_couple(input_.tau_nm(t_s, i), first, u, out);
     }
   }
   if (has_tip_force_) {
@@ -105,8 +110,46 @@ double PccSystem::kinetic_energy_j(ConstVector u, ConstVector velocity) {
   return kinetic_energy(arm_, workspace_, u, velocity);
 }
 
-double PccSystem::potential_energy_j(ConstVector u) const {
+double PccSystem::potential_energy_j(ConstVector u) {
   return gravity_potential(arm_, u) + 0.5 * u.dot(stiffness_.cwiseProduct(u));
+}
+
+void PccSystem::spread(ConstVector u, Vector x) const {
+  for (int j = 0; j < arm_.size(); ++j) {
+    x.segment<2>(2 * j) = share_[j] * u.segment<2>(2 * (j / pieces_));
+  }
+}
+
+void PccSystem::segment_ends(ConstVector x, std::span<Eigen::Isometry3d> ends) const {
+  forward_kinematics(arm_, x, piece_ends_);
+  for (int i = 0; i < segments_; ++i) {
+    ends[static_cast<std::size_t>(i)] =
+        piece_ends_[static_cast<std::size_t>((i + 1) * pieces_ - 1)];
+  }
+}
+
+void PccSystem::curvature(ConstVector x, ConstVector v, Vector u, Vector rate) const {
+  if (pieces_ == 1) {
+    u = x;
+    rate = v;
+    return;
+  }
+  for (int i = 0; i < segments_; ++i) {
+    Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
+    Eigen::Vector3d chord = Eigen::Vector3d::Zero();
+    Eigen::Vector3d angular = Eigen::Vector3d::Zero();
+    for (int j = i * pieces_; j < (i + 1) * pieces_; ++j) {
+      const Eigen::Vector2d bend = x.segment<2>(2 * j);
+      const double length = arm_.segments[static_cast<std::size_t>(j)].length_m;
+      chord += rotation * segment_tip(length, bend);
+      angular += rotation * (segment_angular_jacobian(bend) * v.segment<2>(2 * j));
+      rotation = rotation * segment_rotation(bend);
+    }
+    Eigen::Vector2d bend, bend_rate;
+    fit_segment(rotation, chord, angular, bend, bend_rate);
+    u.segment<2>(2 * i) = bend;
+    rate.segment<2>(2 * i) = bend_rate;
+  }
 }
 
 }  // namespace softarm

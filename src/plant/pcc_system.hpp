@@ -1,25 +1,28 @@
 // The piecewise constant curvature arm as a second-order system: (16) with a tip force, behind
-// valves.
+// valves; one piece a segment or several.
 #pragma once
 
 #include <Eigen/Core>
 
-#include "plant/second_order_system.hpp"
+#include "plant/actuator_input.hpp"
+#include "plant/plant_system.hpp"
 #include "softarm/model/dynamics.hpp"
 #include "softarm/plant/settings.hpp"
 
 namespace softarm {
 
-/// r = B u'' + C u' + D u' + G + K u - A tau_A(t) - J' f_ext. The actuation is given in the
-/// chambers' own terms: the generalized force that A_chamber would make of it, decaying
-/// exponentially from one value to another as the valves do.
-class PccSystem final : public SecondOrderSystem {
+/// r = B u'' + C u' + D u' + G + K u - A tau_A(t) - J' f_ext, where u are the curvatures of all
+/// pieces: `PlantKind::pcc` and `PlantKind::refined`. The moment of a segment's chambers follows
+/// the body and acts on each of its pieces alike; the paper's couple has fixed axes, those of the
+/// segment's start, and acts between there and the segment's end.
+class PccSystem final : public PlantSystem {
  public:
+  /// @throw std::invalid_argument for pieces that cannot be.
   explicit PccSystem(const PlantSettings& settings);
 
-  /// From t_s on, the chambers' force is target + (present - target) exp(-(t - t_s) / lag_s); lag
-  /// 0: target.
-  void drive(double t_s, ConstVector present_nm, ConstVector target_nm, double lag_s);
+  void drive(double t_s, ConstVector present_nm, ConstVector target_nm, double lag_s) override {
+    input_.drive(t_s, present_nm, target_nm, lag_s);
+  }
 
   int size() const override { return arm_.dof(); }
   void residual(double t_s, ConstVector u, ConstVector velocity, ConstVector acceleration,
@@ -29,28 +32,33 @@ class PccSystem final : public SecondOrderSystem {
                  Matrix by_acceleration, Matrix by_velocity, Matrix by_u) override;
   Powers powers(double t_s, ConstVector u, ConstVector velocity) override;
 
-  double kinetic_energy_j(ConstVector u, ConstVector velocity);
-  double potential_energy_j(
-      ConstVector u) const;  ///< gravity (zero at the world's origin) and bending
+  double kinetic_energy_j(ConstVector u, ConstVector velocity) override;
+  double potential_energy_j(ConstVector u) override;
+  void spread(ConstVector u, Vector x) const override;
+  void segment_ends(ConstVector x, std::span<Eigen::Isometry3d> ends) const override;
+  void curvature(ConstVector x, ConstVector v, Vector u, Vector rate) const override;
 
  private:
   /// out += A tau_A(t) + J' f_ext.
   void add_input(double t_s, ConstVector u, Vector out);
-  const Eigen::VectorXd& chamber_force(double t_s);
+  void add_couple(const Eigen::Vector2d& tau_nm, int first_piece, ConstVector u, Vector out) const;
 
-  ArmParameters arm_;
+  int segments_;
+  int pieces_;             // a segment
+  ArmParameters arm_;      // of pieces
+  Eigen::VectorXd share_;  // of a segment's bend under a uniform moment, one a piece
   Eigen::Vector3d tip_force_n_;
   bool has_tip_force_;
   DynamicsWorkspace workspace_;
-  Eigen::VectorXd stiffness_, damping_;  // diagonals of K and D
-  Eigen::VectorXd target_nm_, excess_nm_;
-  double since_s_ = 0.0;
-  double rate_per_s_ = 0.0;  // 1 / lag, or 0 for a force that does not change
-  double force_time_s_ = 0.0;
-  bool force_known_ = false;
-  Eigen::VectorXd force_nm_;                       // at force_time_s_
+  ActuatorInput input_;
+  Eigen::VectorXd stiffness_, damping_;            // diagonals of K and D
   Eigen::VectorXd shifted_, above_, below_, sum_;  // scratch
   Eigen::MatrixXd coriolis_;
+  mutable std::vector<Eigen::Isometry3d> piece_ends_;
 };
+
+/// The arm of pieces that `settings` ask for: a segment is `refined.pieces` of them, one for
+/// `PlantKind::pcc`. @throw std::invalid_argument
+ArmParameters pieces_of(const PlantSettings& settings);
 
 }  // namespace softarm

@@ -18,9 +18,10 @@ int checked_count(int chambers) {
 
 }  // namespace
 
-Valves::Valves(const ValveSettings& settings, int chambers)
+Valves::Valves(const ValveSettings& settings, int chambers, bool both_signs)
     : lag_s_(settings.lag_s),
       supply_bar_(settings.supply_pressure_bar),
+      lowest_bar_(both_signs ? -settings.supply_pressure_bar : 0.0),
       pressure_bar_(Eigen::VectorXd::Zero(checked_count(chambers))),
       command_bar_(Eigen::VectorXd::Zero(chambers)) {
   if (!(lag_s_ >= 0.0) || !std::isfinite(lag_s_)) {
@@ -37,9 +38,8 @@ Valves::Valves(const ValveSettings& settings, int chambers)
 void Valves::command(std::span<const double> command_bar) noexcept {
   const std::size_t count = std::min(command_bar.size(), static_cast<std::size_t>(size()));
   for (std::size_t i = 0; i < count; ++i) {
-    // The comparison is written so that NaN ends up at zero, the safe side.
-    const double wanted = command_bar[i] > 0.0 ? command_bar[i] : 0.0;
-    command_bar_[static_cast<Eigen::Index>(i)] = std::min(wanted, supply_bar_);
+    const double wanted = std::isnan(command_bar[i]) ? 0.0 : command_bar[i];  // the safe side
+    command_bar_[static_cast<Eigen::Index>(i)] = std::clamp(wanted, lowest_bar_, supply_bar_);
   }
   if (lag_s_ == 0.0) {
     pressure_bar_ = command_bar_;

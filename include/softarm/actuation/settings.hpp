@@ -1,6 +1,7 @@
 // What an experiment says about the chambers of each segment and the limits of their valves.
 #pragma once
 
+#include <cstddef>
 #include <optional>
 #include <vector>
 
@@ -13,7 +14,17 @@ struct Chamber {
   double gain_nm_per_bar = 0.839;
 };
 
+/// What a command is made of.
+enum class ActuationKind {
+  chambers,  ///< pressures of chambers, in bar, none below zero
+  torque     ///< tau_A itself, two signed moments (N m) about the local x and y axes a segment: for
+             ///< simulated arms only. What is named `_bar` then counts N m.
+};
+
+/// With `ActuationKind::torque` a segment has two "chambers", moments about x and y whose angles
+/// and gains mean nothing, and the limits are -max and max.
 struct ActuationSettings {
+  ActuationKind kind = ActuationKind::chambers;
   std::vector<std::vector<Chamber>>
       segments;  ///< chambers of each segment, in the order of the valves
   double min_pressure_bar = 0.0;
@@ -23,5 +34,15 @@ struct ActuationSettings {
   double vent_bar_per_s = 8.0;      ///< rate of the ramp to zero when venting
   std::optional<double> plane_rad;  ///< a planar arm bends only in the plane at this phi
 };
+
+/// Turns settings for `segments` segments into actuation by torque within +-`max_torque_nm`.
+inline void set_torque_actuation(ActuationSettings& settings, int segments, double max_torque_nm) {
+  settings.kind = ActuationKind::torque;
+  settings.segments.assign(static_cast<std::size_t>(segments), std::vector<Chamber>(2));
+  settings.min_pressure_bar = -max_torque_nm;
+  settings.max_pressure_bar = max_torque_nm;
+  settings.bias_pressure_bar = 0.0;
+  settings.plane_rad.reset();
+}
 
 }  // namespace softarm

@@ -39,6 +39,7 @@ class ArmPlant {
   ArmPlant& operator=(ArmPlant&&) noexcept;
 
   int segments() const noexcept;
+  int dof() const noexcept;       ///< coordinates of the kind at hand
   int chambers() const noexcept;  ///< of all segments together
 
   /// Sets what the valves are commanded from now on. @param command_bar `chambers()` pressures
@@ -54,14 +55,26 @@ class ArmPlant {
   void advance(double t_end_s, std::span<const double> command_bar);
 
   /// Puts the arm into another state (u in rad, velocity in rad/s, 2n each; pressures in bar),
+  /// spread over the parts of the segments as in `PlantSettings::initial_u_rad`,
   /// keeping the time; `supplied` and `dissipated` count from here. @throw std::invalid_argument
   /// for sizes or numbers that are wrong.
   void reset(ConstVectorRef u_rad, ConstVectorRef velocity_radps,
              std::span<const double> pressure_bar);
 
   double time_s() const noexcept;
+
+  /// u (2n, rad) and u' (rad/s). Where a segment has several parts: of the PCC segment whose end is
+  /// turned as this segment's end is, by the orientation part of the estimator's formula, without
+  /// the twist that a PCC segment has not; theta on [0, 2 pi).
+  void curvature(SegmentVector& u_rad, SegmentVector& velocity_radps) const noexcept;
   SegmentVector u_rad() const noexcept;
   SegmentVector velocity_radps() const noexcept;
+
+  /// The coordinates of the kind at hand and their rates, `dof()` each: u of every segment (pcc) or
+  /// piece (refined), or the angles about x and y of every joint (links), base to tip; rad, rad/s.
+  Eigen::VectorXd coordinates() const noexcept;
+  Eigen::VectorXd coordinate_rates() const noexcept;
+
   const Eigen::VectorXd& pressures_bar() const noexcept;  ///< behind the valves
   const Eigen::VectorXd& commanded_bar() const noexcept;
 

@@ -2,7 +2,9 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
+#include <vector>
 
 #include "softarm/actuation/settings.hpp"
 #include "softarm/model/arm.hpp"
@@ -10,7 +12,7 @@
 namespace softarm {
 
 /// First-order valves between a commanded and a real pressure. Left out (lag 0): the command is the
-/// pressure.
+/// pressure. With actuation by torque, read N m for bar.
 struct ValveSettings {
   double lag_s = 0.0;                ///< time constant
   double supply_pressure_bar = 2.0;  ///< no pressure above it
@@ -25,6 +27,34 @@ struct MocapSettings {
       0.0;  ///< standard deviation of the rotation vector an axis of every body
   double dropout_probability = 0.0;  ///< of a whole frame, independent from frame to frame
   bool noise_on_base = true;         ///< the base is a measured body too, unless it is fixed
+};
+
+/// What the simulated arm is made of.
+enum class PlantKind {
+  pcc,      ///< the model itself: one constant-curvature piece a segment
+  refined,  ///< several constant-curvature pieces a segment; converges to a bending rod
+  links     ///< the paper's section VI: rigid links joined by two crossed revolute joints
+};
+
+/// `PlantKind::refined`. Weights tell how a segment's length, mass and bending rigidity E I (and
+/// damping with it) vary along it, one number a piece; empty: all alike. Only their ratios count:
+/// length, mass, and the bend under a uniform moment stay those of the segment.
+struct RefinedSettings {
+  int pieces = 8;  ///< a segment; kMaxSegments pieces at most in the whole arm
+  std::vector<double> length_weights;
+  std::vector<double> mass_weights;
+  std::vector<double> rigidity_weights;
+};
+
+inline constexpr int kMaxLinksPerSegment = 64;
+
+/// `PlantKind::links`. Stiffness and damping act about each of the two axes of a joint; left out
+/// they are those of the segment times the number of its links, so that equal moments on the joints
+/// bend it as they bend the segment.
+struct LinkSettings {
+  int links_per_segment = 6;
+  std::optional<double> joint_stiffness_nm_per_rad;
+  std::optional<double> joint_damping_nms_per_rad;
 };
 
 /// Which diagonally implicit Runge-Kutta method of ARKODE integrates (stiffly accurate, no explicit
@@ -49,11 +79,15 @@ struct IntegratorCounters {
 
 /// The simulated arm. Its `arm` and `actuation` may differ from what the controller believes.
 struct PlantSettings {
+  PlantKind kind = PlantKind::pcc;
+  RefinedSettings refined;
+  LinkSettings links;
   ArmParameters arm;
   ActuationSettings actuation;
   ValveSettings valves;
   MocapSettings mocap;
-  SegmentVector initial_u_rad;  ///< at rest
+  /// At rest. Where a segment has several parts, each takes its share, as under a uniform moment.
+  SegmentVector initial_u_rad;
   Eigen::Vector3d tip_force_n =
       Eigen::Vector3d::Zero();  ///< constant external force at the tip, world frame
   IntegratorMethod method = IntegratorMethod::cash4;

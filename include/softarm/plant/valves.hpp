@@ -18,9 +18,10 @@ namespace softarm {
 class Valves {
  public:
   /// @param chambers number of valves, >= 0. All start at 0 bar with 0 bar commanded.
+  /// @param both_signs for actuation by torque: commands are bounded to [-supply, supply].
   /// @throw std::invalid_argument for a negative count, a lag that is negative or not finite, a
   /// supply below 0.
-  Valves(const ValveSettings& settings, int chambers);
+  Valves(const ValveSettings& settings, int chambers, bool both_signs = false);
 
   int size() const noexcept { return static_cast<int>(pressure_bar_.size()); }
 
@@ -48,6 +49,7 @@ class Valves {
  private:
   double lag_s_;
   double supply_bar_;
+  double lowest_bar_;
   Eigen::VectorXd pressure_bar_;
   Eigen::VectorXd command_bar_;
 };
