@@ -8,10 +8,10 @@ namespace {
 /// d_k = c_k(4s) from c_j(s): integrate the addition theorem of cos k times,
 /// 2^k d_k = c0 c_k + c1 c_{k-1} + sum_{j=0}^{k-2} c_{k-j} / j!. All terms are positive for theta <
 /// pi/2.
-template <int K>
-double doubled(const std::array<double, 12>& c) noexcept {
+template <int K, class T>
+T doubled(const std::array<T, 12>& c) noexcept {
   constexpr auto k = static_cast<std::size_t>(K);
-  double sum = c[0] * c[k] + c[1] * c[k - 1];
+  T sum = c[0] * c[k] + c[1] * c[k - 1];
 #pragma GCC unroll 16
   for (std::size_t j = 0; j < k - 1; ++j) sum += c[k - j] * detail::kInverseFactorial[j];
   return sum * (1.0 / static_cast<double>(1 << K));
@@ -20,11 +20,12 @@ double doubled(const std::array<double, 12>& c) noexcept {
 /// Below the limit. Each coefficient set is the only combination of c_k(4s) and c_k(s), k = 3 ...
 /// 11, whose power series in s is that of the integral: products of sines and cosines of x theta
 /// become those of 2 x theta, and the polynomials in x in front are what raises k.
-ArcMoments from_entire(double scale, const std::array<double, 12>& c) noexcept {
-  const double d3 = doubled<3>(c), d4 = doubled<4>(c), d5 = doubled<5>(c), d6 = doubled<6>(c),
-               d7 = doubled<7>(c), d8 = doubled<8>(c), d9 = doubled<9>(c), d10 = doubled<10>(c),
-               d11 = doubled<11>(c);
-  ArcMoments m;
+template <class T>
+ArcMomentsOf<T> from_entire(T scale, const std::array<T, 12>& c) noexcept {
+  const T d3 = doubled<3>(c), d4 = doubled<4>(c), d5 = doubled<5>(c), d6 = doubled<6>(c),
+          d7 = doubled<7>(c), d8 = doubled<8>(c), d9 = doubled<9>(c), d10 = doubled<10>(c),
+          d11 = doubled<11>(c);
+  ArcMomentsOf<T> m;
   m.pp = scale * (8.0 * d5 - 2.0 * c[5]);
   m.pq = scale * (4.0 * d4 - c[4]);
   m.qq = scale * (2.0 * d3);
@@ -104,12 +105,31 @@ ArcMoments from_trigonometry(double scale, double s, double c0, double c1) noexc
   return m;
 }
 
+template <class T>
+std::array<T*, 15> members(ArcMomentsOf<T>& m) noexcept {
+  return {&m.pp,  &m.pq,  &m.qq,  &m.pp1,  &m.pq1,  &m.qp1,  &m.qq1, &m.pp2,
+          &m.pq2, &m.qp2, &m.qq2, &m.p1p1, &m.q1q1, &m.p1p2, &m.q1q2};
+}
+
 }  // namespace
 
 ArcMoments arc_moments(double mass_length_squared, double s,
                        const std::array<double, 12>& c) noexcept {
   if (s < kArcSeriesLimit) return from_entire(mass_length_squared, c);
   return from_trigonometry(mass_length_squared, s, c[0], c[1]);
+}
+
+ArcMomentsOf<Lanes> arc_moments(const Lanes& mass_length_squared, const Lanes& s,
+                                const std::array<Lanes, 12>& c) noexcept {
+  ArcMomentsOf<Lanes> all = from_entire(mass_length_squared, c);
+  for (int lane = 0; lane < kLanes; ++lane) {
+    if (s[lane] < kArcSeriesLimit) continue;
+    ArcMoments one = from_trigonometry(mass_length_squared[lane], s[lane], c[0][lane], c[1][lane]);
+    const auto to = members(all);
+    const auto from = members(one);
+    for (std::size_t k = 0; k < to.size(); ++k) (*to[k])[lane] = *from[k];
+  }
+  return all;
 }
 
 }  // namespace softarm

@@ -11,7 +11,8 @@
 namespace softarm {
 
 DynamicsWorkspace::Storage::Storage(int segments)
-    : forces(static_cast<std::size_t>(segments)),
+    : lanes(static_cast<std::size_t>((segments + kLanes - 1) / kLanes)),
+      forces(static_cast<std::size_t>(segments)),
       columns(static_cast<std::size_t>(segments)),
       zeros(Eigen::VectorXd::Zero(2 * segments)),
       bias(2 * segments),

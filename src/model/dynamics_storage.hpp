@@ -5,20 +5,16 @@
 #include <vector>
 
 #include "model/own_columns.hpp"
-#include "model/segment_geometry.hpp"
+#include "model/segment_lanes.hpp"
 #include "softarm/model/dynamics.hpp"
 
 namespace softarm {
 
-/// Inverse dynamics: what the pass from base to tip leaves for the way back. All in S_{i-1}.
+/// Inverse dynamics: what a segment's own mass does, in S_{i-1}.
 struct SegmentForces {
-  double ux, uy;
-  Curve tip;
-  Spin turn_rate;
-  Turn turn;
-  Vector3 force;   ///< of the segment's own mass
-  Vector3 moment;  ///< of the segment's own mass, about its base p_{i-1}
-  Pair torque;     ///< of the segment's own mass, on its own u
+  Vector3 force;
+  Vector3 moment;             ///< about the segment's base p_{i-1}
+  double torque_x, torque_y;  ///< on the segment's own u
 };
 
 /// Full matrices: a segment's columns, all in S_{i-1}. A dot is a time derivative in the world,
@@ -37,6 +33,7 @@ struct SegmentColumns {
 struct DynamicsWorkspace::Storage {
   explicit Storage(int segments);
 
+  std::vector<SegmentLanes> lanes;  // four segments each
   std::vector<SegmentForces> forces;
   std::vector<SegmentColumns> columns;
   Eigen::VectorXd zeros, bias, scale, rhs, solution, residual;

@@ -3,17 +3,97 @@
 //
 // Everything is written in the local frames S_{i-1}; no far origin is ever used, so long chains and
 // unequal segments keep their digits. Outward, the second derivative of the frames along a and b is
-// carried: D_a D_b R = ([alpha]x +
-// ([w_a]x [w_b]x + [w_b]x [w_a]x) / 2) R. What B adds, the first derivative along x, enters the
-// same two places, and gravity is an acceleration of the base.
+// carried: D_a D_b R = M R with M = [alpha]x + ([w_a]x [w_b]x + [w_b]x [w_a]x) / 2. What B adds,
+// the first derivative along x, enters the same two places, and gravity is an acceleration of the
+// base. What a segment does within its own frame waits for nobody: four segments at a time
+// (segment_lanes.hpp).
 #include <Eigen/Core>
 
-#include "model/arc_moments.hpp"
 #include "model/dynamics_storage.hpp"
 #include "softarm/model/dynamics.hpp"
 
 namespace softarm {
 namespace {
+
+Lanes load(const double* v, int stride, int count) noexcept {
+  return Lanes{v[0], count > 1 ? v[stride] : 0.0, count > 2 ? v[2 * stride] : 0.0,
+               count > 3 ? v[3 * stride] : 0.0};
+}
+
+DirectionOf<Lanes> load(const double* v, int count, Lanes ux, Lanes uy) noexcept {
+  return direction(ux, uy, load(v, 2, count), load(v + 1, 2, count));
+}
+
+/// Derivative along x, and twice along a and b.
+template <bool kInertia, bool kCoriolis, class Coefficients>
+Vec3<Lanes> own(const Coefficients& f, const SegmentLanes& k,
+                const DirectionOf<Lanes>& x) noexcept {
+  if constexpr (kInertia && kCoriolis) {
+    return second(f, k.ux, k.uy, k.a, k.b) + first(f, k.ux, k.uy, x);
+  }
+  if constexpr (kCoriolis) return second(f, k.ux, k.uy, k.a, k.b);
+  return first(f, k.ux, k.uy, x);
+}
+
+/// The arc's acceleration within its frame is P x + P1 g + P2 kappa u in the plane and Q1 beta + Q2
+/// kappa along z.
+void own_arc(const DirectionOf<Lanes>& x, SegmentLanes& k) noexcept {
+  const auto& m = k.arc;
+  const Lanes ux = k.ux, uy = k.uy, s = ux * ux + uy * uy;
+  const Lanes beta = k.a.x * k.b.x + k.a.y * k.b.y + x.along;
+  const Lanes kappa = k.a.along * k.b.along;
+  const Lanes g_x = k.b.along * k.a.x + k.a.along * k.b.x + beta * ux;
+  const Lanes g_y = k.b.along * k.a.y + k.a.along * k.b.y + beta * uy;
+  const Lanes on_p = m.pp2 * kappa, on_q = m.qp2 * kappa;
+  k.own_p = {m.pp * x.x + m.pp1 * g_x + on_p * ux, m.pp * x.y + m.pp1 * g_y + on_p * uy,
+             m.pq1 * beta + m.pq2 * kappa};
+  k.own_q = {m.pq * x.x + m.qp1 * g_x + on_q * ux, m.pq * x.y + m.qp1 * g_y + on_q * uy,
+             m.qq1 * beta + m.qq2 * kappa};
+  // u . g = 2 kappa + beta s
+  k.own_stretch = m.pp1 * x.along + m.p1p1 * (2.0 * kappa + beta * s) + m.p1p2 * kappa * s +
+                  m.q1q1 * beta + m.q1q2 * kappa;
+}
+
+/// What segments `begin` ... `begin + 3` do within their own frames; lanes beyond the last segment
+/// are straight and weigh nothing.
+template <MassModel kMass, bool kInertia, bool kCoriolis>
+void prepare(const ArmParameters& arm, const BilinearInputs& in, int begin,
+             SegmentLanes& k) noexcept {
+  static_assert(sizeof(SegmentParameters) % sizeof(double) == 0);
+  constexpr int kStride = sizeof(SegmentParameters) / sizeof(double);
+  const int count = arm.size() - begin;
+  const SegmentParameters& segment = arm.segments[static_cast<std::size_t>(begin)];
+  const Lanes length = load(&segment.length_m, kStride, count);
+  k.mass = load(&segment.mass_kg, kStride, count);
+  k.ux = load(in.u + 2 * begin, 2, count);
+  k.uy = load(in.u + 2 * begin + 1, 2, count);
+  const Lanes s = k.ux * k.ux + k.uy * k.uy;
+  constexpr bool kArc = kMass == MassModel::distributed && (kInertia || kCoriolis);
+  const auto c = entire < kArc ? 12 : 8 > (s);
+  k.c0 = c[0];
+  k.tip = tip_curve(length, c);
+  k.centre = centre_curve(length, c);
+  k.turn_rate = spin(c);
+  DirectionOf<Lanes> x{};
+  if constexpr (kInertia) x = load(in.x + 2 * begin, count, k.ux, k.uy);
+  if constexpr (kCoriolis) {
+    k.a = load(in.a + 2 * begin, count, k.ux, k.uy);
+    k.b = load(in.b + 2 * begin, count, k.ux, k.uy);
+    k.spin_a = first(k.turn_rate, k.ux, k.uy, k.a);
+    k.spin_b = first(k.turn_rate, k.ux, k.uy, k.b);
+  } else if constexpr (kArc) {
+    k.a = k.b = DirectionOf<Lanes>{};
+  }
+  if constexpr (kInertia || kCoriolis) {
+    k.own_tip = own<kInertia, kCoriolis>(k.tip, k, x);
+    k.own_centre = own<kInertia, kCoriolis>(k.centre, k, x);
+    k.own_spin = own<kInertia, kCoriolis>(k.turn_rate, k, x);
+  }
+  if constexpr (kArc) {
+    k.arc = arc_moments(k.mass * length * length, s, c);
+    own_arc(x, k);
+  }
+}
 
 /// Motion of the frame S_{i-1}, in its own coordinates.
 struct FrameMotion {
@@ -21,161 +101,150 @@ struct FrameMotion {
   Vector3 angular, linear;  ///< alpha and D_a D_b p - g, what x does included
 };
 
-struct Inputs {
-  const double* u;
-  const double* a;
-  const double* b;
-  const double* x;
+/// The acceleration of a point (P u, Q) of the segment, beyond that of p_{i-1} and its own within
+/// S_{i-1}: P on_p + Q on_q + P1 on_p1 + Q1 on_q1.
+struct FrameAcceleration {
+  Vector3 on_p, on_q, on_p1, on_q1;
 };
 
-/// ([w_a]x [w_b]x + [w_b]x [w_a]x) r / 2: the centripetal part for the bilinear product.
-inline Vector3 centripetal(const FrameMotion& m, double ab, const Vector3& r) noexcept {
-  return (0.5 * dot(m.spin_b, r)) * m.spin_a + (0.5 * dot(m.spin_a, r)) * m.spin_b - ab * r;
+template <bool kInertia, bool kCoriolis>
+inline FrameAcceleration frame_acceleration(const FrameMotion& m, const SegmentLanes& k,
+                                            int l) noexcept {
+  const double ux = k.ux[l], uy = k.uy[l];
+  const Vector3& al = m.angular;
+  if constexpr (!kCoriolis) {
+    return {{al.z * -uy, al.z * ux, al.x * uy - al.y * ux}, {al.y, -al.x, 0.0}, {}, {}};
+  }
+  const Vector3 &a = m.spin_a, &b = m.spin_b;
+  const double xx = a.x * b.x, yy = a.y * b.y, zz = a.z * b.z;
+  const double xy = 0.5 * (a.x * b.y + a.y * b.x);
+  const double xz = 0.5 * (a.x * b.z + a.z * b.x);
+  const double yz = 0.5 * (a.y * b.z + a.z * b.y);
+  const double ax = k.a.x[l], ay = k.a.y[l], bx = k.b.x[l], by = k.b.y[l];
+  const Vector3 sweep = k.b.along[l] * a + k.a.along[l] * b;
+  return {// M (u, 0) + w_a x b + w_b x a
+          {xy * uy - (yy + zz) * ux - al.z * uy - (a.z * by + b.z * ay),
+           xy * ux - (xx + zz) * uy + al.z * ux + (a.z * bx + b.z * ax),
+           (xz - al.y) * ux + (yz + al.x) * uy + (a.x * by - a.y * bx) + (b.x * ay - b.y * ax)},
+          // M z
+          {xz + al.y, yz - al.x, -(xx + yy)},
+          // ((u.b) w_a + (u.a) w_b) x (u, 0), and the same x z
+          {-sweep.z * uy, sweep.z * ux, sweep.x * uy - sweep.y * ux},
+          {sweep.y, -sweep.x, 0.0}};
 }
 
-template <bool kInertia, bool kCoriolis>
-struct Along {
-  Direction a{}, b{}, x{};
-
-  Along(const Inputs& in, int i, double ux, double uy) noexcept {
-    if constexpr (kCoriolis) {
-      a = direction(ux, uy, in.a[2 * i], in.a[2 * i + 1]);
-      b = direction(ux, uy, in.b[2 * i], in.b[2 * i + 1]);
-    }
-    if constexpr (kInertia) x = direction(ux, uy, in.x[2 * i], in.x[2 * i + 1]);
-  }
-
-  /// Derivative that does not come from the frame's own motion: along x, and twice along a and b.
-  template <class Coefficients>
-  Vector3 own(const Coefficients& f, double ux, double uy) const noexcept {
-    if constexpr (kInertia && kCoriolis) return second(f, ux, uy, a, b) + first(f, ux, uy, x);
-    if constexpr (kCoriolis) return second(f, ux, uy, a, b);
-    return first(f, ux, uy, x);
-  }
-};
-
-/// Acceleration of a point of the segment whose motion within S_{i-1} the curve f describes.
-template <bool kInertia, bool kCoriolis>
-inline Vector3 acceleration(const FrameMotion& m, double spin_ab, const Curve& f, double ux,
-                            double uy, const Along<kInertia, kCoriolis>& along,
-                            const Vector3& r) noexcept {
-  Vector3 result = m.linear;
-  if constexpr (kInertia || kCoriolis) result += cross(m.angular, r) + along.own(f, ux, uy);
-  if constexpr (kCoriolis) {
-    result += centripetal(m, spin_ab, r) + cross(m.spin_a, first(f, ux, uy, along.b)) +
-              cross(m.spin_b, first(f, ux, uy, along.a));
-  }
-  return result;
+inline Vector3 acceleration(double p, double q, double p1, double q1, const Vector3& base,
+                            const FrameAcceleration& f) noexcept {
+  return {base.x + p * f.on_p.x + q * f.on_q.x + p1 * f.on_p1.x + q1 * f.on_q1.x,
+          base.y + p * f.on_p.y + q * f.on_q.y + p1 * f.on_p1.y + q1 * f.on_q1.y,
+          base.z + p * f.on_p.z + q * f.on_q.z + p1 * f.on_p1.z};
 }
 
-/// Distributed mass: what the arc's motion about its base adds to moment and torque.
-template <bool kInertia, bool kCoriolis>
-inline void add_arc_forces(const SegmentParameters& segment, const std::array<double, 12>& c,
-                           const FrameMotion& m, double spin_ab,
-                           const Along<kInertia, kCoriolis>& along, SegmentForces& out) noexcept {
-  const double ux = out.ux, uy = out.uy, s = ux * ux + uy * uy;
-  const double scale = segment.mass_kg * segment.length_m * segment.length_m;
-  const ArcMoments moments = arc_moments(scale, s, c);
-  const Direction &a = along.a, &b = along.b, &x = along.x;
-  const double beta = a.x * b.x + a.y * b.y + x.along;
-  const ArcMotion motion{x.x,
-                         x.y,
-                         b.along * a.x + a.along * b.x + beta * ux,
-                         b.along * a.y + a.along * b.y + beta * uy,
-                         beta,
-                         a.along * b.along,
-                         x.along};
-  const auto add = [&out](const ArcForces& f) {
-    out.moment += f.moment;
-    out.torque += f.torque;
-  };
-  add(relative_motion_forces(moments, ux, uy, s, motion));
-  add(angular_forces(moments, ux, uy, s, m.angular));
-  if constexpr (kCoriolis) {
-    add(centripetal_forces(moments, ux, uy, s, m.spin_a, m.spin_b, spin_ab));
-    add(coriolis_forces(moments, ux, uy, s, m.spin_a, b));
-    add(coriolis_forces(moments, ux, uy, s, m.spin_b, a));
-  }
-}
-
-template <MassModel kMass, bool kInertia, bool kCoriolis>
-inline void own_forces(const SegmentParameters& segment, const auto& c, const FrameMotion& m,
-                       double spin_ab, const Along<kInertia, kCoriolis>& along,
+/// [d(p u, q)/du]^T F with the derivative's stretch . F already summed.
+inline void set_torque(double ux, double uy, double x, double y, double stretch,
                        SegmentForces& out) noexcept {
-  const double ux = out.ux, uy = out.uy;
-  const Curve centre = centre_curve(segment.length_m, c);
-  const Vector3 r = point(centre, ux, uy);
-  const double mass = segment.mass_kg;
-  out.force = mass * acceleration(m, spin_ab, centre, ux, uy, along, r);
-  if constexpr (kMass == MassModel::point || !(kInertia || kCoriolis)) {
-    out.moment = cross(r, out.force);
-    out.torque = project(centre, ux, uy, out.force);
-  } else {
-    // The base's acceleration acts on the first moment; the rest needs second moments of the arc.
-    const Vector3 uniform = mass * m.linear;
-    out.moment = cross(r, uniform);
-    out.torque = project(centre, ux, uy, uniform);
-    add_arc_forces(segment, c, m, spin_ab, along, out);
-  }
+  out.torque_x = x + stretch * ux;
+  out.torque_y = y + stretch * uy;
+}
+
+/// All mass in the centre. Gravity alone does the same to an arc.
+inline void point_forces(const SegmentLanes& k, int l, SegmentForces& out) noexcept {
+  const double ux = k.ux[l], uy = k.uy[l], p = k.centre.p[l];
+  const Vector3& F = out.force;
+  out.moment = cross(Vector3{p * ux, p * uy, k.centre.q[l]}, F);
+  set_torque(ux, uy, p * F.x, p * F.y,
+             k.centre.p1[l] * (ux * F.x + uy * F.y) + k.centre.q1[l] * F.z, out);
+}
+
+/// Mass along the arc: the integrals of P, Q and (P1 u, Q1) times the acceleration.
+inline void arc_forces(const SegmentLanes& k, int l, const Vector3& weight,
+                       const FrameAcceleration& f, SegmentForces& out) noexcept {
+  const double ux = k.ux[l], uy = k.uy[l];
+  const auto& m = k.arc;
+  const double pp = m.pp[l], pq = m.pq[l], pp1 = m.pp1[l], pq1 = m.pq1[l], qp1 = m.qp1[l];
+  const Vector3 on_p = acceleration(pp, pq, pp1, pq1, k.centre.p[l] * weight + lane(k.own_p, l), f);
+  const Vector3 on_q =
+      acceleration(pq, m.qq[l], qp1, m.qq1[l], k.centre.q[l] * weight + lane(k.own_q, l), f);
+  // The sweep's shares in the stretch cancel: u . (v x z) + z . (v x u) = 0.
+  const double stretch = k.own_stretch[l] + k.centre.p1[l] * (ux * weight.x + uy * weight.y) +
+                         k.centre.q1[l] * weight.z + pp1 * (ux * f.on_p.x + uy * f.on_p.y) +
+                         pq1 * f.on_p.z + qp1 * (ux * f.on_q.x + uy * f.on_q.y) +
+                         m.qq1[l] * f.on_q.z;
+  out.moment = {uy * on_p.z - on_q.y, on_q.x - ux * on_p.z, ux * on_p.y - uy * on_p.x};
+  set_torque(ux, uy, on_p.x, on_p.y, stretch, out);
+}
+
+inline Turn turn(const SegmentLanes& k, int l) noexcept {
+  return {k.ux[l], k.uy[l], k.c0[l], k.turn_rate.c1[l], k.turn_rate.c2[l]};
 }
 
 template <MassModel kMass, bool kInertia, bool kCoriolis>
-void outward(const ArmParameters& arm, const Inputs& in, Vector3 base,
+void outward(const ArmParameters& arm, const BilinearInputs& in, Vector3 base, SegmentLanes* lanes,
              SegmentForces* out) noexcept {
-  constexpr int kFunctions = kMass == MassModel::point ? 8 : 12;
   const int n = arm.size();
   FrameMotion m{{0, 0, 0}, {0, 0, 0}, {0, 0, 0}, base};
   for (int i = 0; i < n; ++i) {
-    const SegmentParameters& segment = arm.segments[static_cast<std::size_t>(i)];
-    const double ux = in.u[2 * i], uy = in.u[2 * i + 1];
-    const auto c = entire<kFunctions>(ux * ux + uy * uy);
-    SegmentForces& s = out[i];
-    s.ux = ux;
-    s.uy = uy;
-    s.tip = tip_curve(segment.length_m, c);
-    s.turn_rate = spin(c);
-    s.turn = {ux, uy, c[0], c[1], c[2]};
-    const Along<kInertia, kCoriolis> along(in, i, ux, uy);
-    const double spin_ab = kCoriolis ? dot(m.spin_a, m.spin_b) : 0.0;
-    own_forces<kMass>(segment, c, m, spin_ab, along, s);
-    if (i + 1 == n) return;
-
-    m.linear =
-        rotate_back(s.turn, acceleration(m, spin_ab, s.tip, ux, uy, along, point(s.tip, ux, uy)));
-    if constexpr (kInertia || kCoriolis) m.angular += along.own(s.turn_rate, ux, uy);
-    if constexpr (kCoriolis) {
-      const Vector3 a = first(s.turn_rate, ux, uy, along.a);
-      const Vector3 b = first(s.turn_rate, ux, uy, along.b);
-      m.angular += 0.5 * (cross(m.spin_a, b) + cross(m.spin_b, a));
-      m.spin_a = rotate_back(s.turn, m.spin_a + a);
-      m.spin_b = rotate_back(s.turn, m.spin_b + b);
+    SegmentLanes& k = lanes[i / kLanes];
+    const int l = i % kLanes;
+    if (l == 0) prepare<kMass, kInertia, kCoriolis>(arm, in, i, k);
+    const Turn to_next = turn(k, l);
+    SegmentForces& own = out[i];
+    if constexpr (!kInertia && !kCoriolis) {
+      own.force = k.mass[l] * m.linear;
+      point_forces(k, l, own);
+      m.linear = rotate_back(to_next, m.linear);
+    } else {
+      const FrameAcceleration f = frame_acceleration<kInertia, kCoriolis>(m, k, l);
+      own.force = k.mass[l] * acceleration(k.centre.p[l], k.centre.q[l], k.centre.p1[l],
+                                           k.centre.q1[l], m.linear + lane(k.own_centre, l), f);
+      if constexpr (kMass == MassModel::point) {
+        point_forces(k, l, own);
+      } else {
+        arc_forces(k, l, k.mass[l] * m.linear, f, own);
+      }
+      m.linear = rotate_back(to_next, acceleration(k.tip.p[l], k.tip.q[l], k.tip.p1[l], k.tip.q1[l],
+                                                   m.linear + lane(k.own_tip, l), f));
+      m.angular += lane(k.own_spin, l);
+      if constexpr (kCoriolis) {
+        const Vector3 a = lane(k.spin_a, l), b = lane(k.spin_b, l);
+        m.angular += 0.5 * (cross(m.spin_a, b) + cross(m.spin_b, a));
+        m.spin_a = rotate_back(to_next, m.spin_a + a);
+        m.spin_b = rotate_back(to_next, m.spin_b + b);
+      }
+      m.angular = rotate_back(to_next, m.angular);
     }
-    if constexpr (kInertia || kCoriolis) m.angular = rotate_back(s.turn, m.angular);
   }
 }
 
-void inward(int n, const SegmentForces* segments, double* out) noexcept {
-  Vector3 force{0, 0, 0}, moment{0, 0, 0};  // of everything beyond p_i, about p_i
+void inward(int n, const SegmentLanes* lanes, const SegmentForces* segments, double* out) noexcept {
+  // Lanes of a Pair: force and moment (about p_i) of everything beyond p_i.
+  PairVector3 beyond{Pair{0, 0}, Pair{0, 0}, Pair{0, 0}};
   for (int i = n - 1; i >= 0; --i) {
-    const SegmentForces& s = segments[i];
-    force = rotate(s.turn, force);
-    moment = rotate(s.turn, moment);
-    const Pair torque =
-        s.torque + project(s.tip, s.ux, s.uy, force) + project(s.turn_rate, s.ux, s.uy, moment);
-    out[2 * i] = torque[0];
-    out[2 * i + 1] = torque[1];
-    moment += s.moment + cross(point(s.tip, s.ux, s.uy), force);
-    force += s.force;
+    const SegmentLanes& k = lanes[i / kLanes];
+    const int l = i % kLanes;
+    const SegmentForces& own = segments[i];
+    beyond = rotate(turn(k, l), beyond);
+    const Vector3 force = column(beyond, 0), moment = column(beyond, 1);
+    const double ux = k.ux[l], uy = k.uy[l], p = k.tip.p[l];
+    const double c1 = k.turn_rate.c1[l], twist = k.turn_rate.c2[l] * moment.z;
+    const double stretch = k.tip.p1[l] * (ux * force.x + uy * force.y) + k.tip.q1[l] * force.z +
+                           k.turn_rate.c3[l] * (ux * moment.y - uy * moment.x);
+    out[2 * i] = own.torque_x + p * force.x + c1 * moment.y + stretch * ux - twist * uy;
+    out[2 * i + 1] = own.torque_y + p * force.y - c1 * moment.x + stretch * uy + twist * ux;
+    const Vector3 lever = cross(Vector3{p * ux, p * uy, k.tip.q[l]}, force);
+    beyond.x += Pair{own.force.x, own.moment.x + lever.x};
+    beyond.y += Pair{own.force.y, own.moment.y + lever.y};
+    beyond.z += Pair{own.force.z, own.moment.z + lever.z};
   }
 }
 
 template <MassModel kMass>
-void outward(const ArmParameters& arm, const Inputs& in, const DynamicsTerms& terms,
-             const Vector3& base, SegmentForces* out) noexcept {
-  if (terms.inertia && terms.coriolis) return outward<kMass, true, true>(arm, in, base, out);
-  if (terms.inertia) return outward<kMass, true, false>(arm, in, base, out);
-  if (terms.coriolis) return outward<kMass, false, true>(arm, in, base, out);
-  outward<kMass, false, false>(arm, in, base, out);
+void outward(const ArmParameters& arm, const BilinearInputs& in, const DynamicsTerms& terms,
+             const Vector3& base, DynamicsWorkspace::Storage& s) noexcept {
+  const auto run =
+      terms.inertia ? (terms.coriolis ? outward<kMass, true, true> : outward<kMass, true, false>)
+                    : (terms.coriolis ? outward<kMass, false, true> : outward<kMass, false, false>);
+  run(arm, in, base, s.lanes.data(), s.forces.data());
 }
 
 }  // namespace
@@ -183,16 +252,16 @@ void outward(const ArmParameters& arm, const Inputs& in, const DynamicsTerms& te
 void inverse_dynamics(const ArmParameters& arm, DynamicsWorkspace& workspace, ConstVectorRef u,
                       ConstVectorRef velocity_a, ConstVectorRef velocity_b,
                       ConstVectorRef acceleration, DynamicsTerms terms, VectorRef out) noexcept {
-  SegmentForces* segments = workspace.storage().forces.data();
-  const Inputs in{u.data(), velocity_a.data(), velocity_b.data(), acceleration.data()};
+  auto& s = workspace.storage();
+  const BilinearInputs in{u.data(), velocity_a.data(), velocity_b.data(), acceleration.data()};
   Vector3 base{0, 0, 0};
   if (terms.gravity) base = from_eigen(-(arm.base_rotation.transpose() * arm.gravity_mps2));
   if (arm.mass == MassModel::point) {
-    outward<MassModel::point>(arm, in, terms, base, segments);
+    outward<MassModel::point>(arm, in, terms, base, s);
   } else {
-    outward<MassModel::distributed>(arm, in, terms, base, segments);
+    outward<MassModel::distributed>(arm, in, terms, base, s);
   }
-  inward(arm.size(), segments, out.data());
+  inward(arm.size(), s.lanes.data(), s.forces.data(), out.data());
 }
 
 }  // namespace softarm

@@ -3,6 +3,9 @@
 namespace softarm {
 namespace {
 
+/// (u x e) for both columns e: the vector J u.
+Pair turned(double ux, double uy) noexcept { return Pair{-uy, ux}; }
+
 /// Terms of `arc_columns`, each for both columns e side by side. In the plane of S_{i-1}: J (x, y)
 /// = (-y, x), u the bending, e the unit vectors, v = u'.
 struct ArcColumnTerms {

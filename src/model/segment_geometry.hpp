@@ -10,12 +10,14 @@ namespace softarm {
 /// A curve L (P(s) u, Q(s)) of u with its derivatives by s, written p1 = 2 dP/ds, p2 = 4 d2P/ds2
 /// because that is how they meet u: dP(s(u)) = p1 (u . du). Segment tip: P = c2, Q = c1. Centre of
 /// mass: P = c3, Q = c2.
-struct Curve {
-  double p, q, p1, q1, p2, q2;
+template <class T>
+struct CurveOf {
+  T p, q, p1, q1, p2, q2;
 };
+using Curve = CurveOf<double>;
 
-template <class Functions>
-inline Curve tip_curve(double length, const Functions& c) noexcept {
+template <class T, class Functions>
+inline CurveOf<T> tip_curve(T length, const Functions& c) noexcept {
   return {length * c[2],
           length * c[1],
           length * (2.0 * c[4] - c[3]),
@@ -24,8 +26,8 @@ inline Curve tip_curve(double length, const Functions& c) noexcept {
           length * (3.0 * (c[5] - c[4]) + c[3])};
 }
 
-template <class Functions>
-inline Curve centre_curve(double length, const Functions& c) noexcept {
+template <class T, class Functions>
+inline CurveOf<T> centre_curve(T length, const Functions& c) noexcept {
   return {length * c[3],
           length * c[2],
           length * (3.0 * c[5] - c[4]),
@@ -35,10 +37,14 @@ inline Curve centre_curve(double length, const Functions& c) noexcept {
 }
 
 /// A direction of u beside u itself, with u . a, which everything below shares.
-struct Direction {
-  double x, y, along;
+template <class T>
+struct DirectionOf {
+  T x, y, along;
 };
-inline Direction direction(double ux, double uy, double x, double y) noexcept {
+using Direction = DirectionOf<double>;
+
+template <class T>
+inline DirectionOf<T> direction(T ux, T uy, T x, T y) noexcept {
   return {x, y, ux * x + uy * y};
 }
 
@@ -47,17 +53,19 @@ inline Vector3 point(const Curve& f, double ux, double uy) noexcept {
 }
 
 /// Derivative of the point along a.
-inline Vector3 first(const Curve& f, double ux, double uy, const Direction& a) noexcept {
-  const double stretch = f.p1 * a.along;
+template <class T>
+inline Vec3<T> first(const CurveOf<T>& f, T ux, T uy, const DirectionOf<T>& a) noexcept {
+  const T stretch = f.p1 * a.along;
   return {f.p * a.x + stretch * ux, f.p * a.y + stretch * uy, f.q1 * a.along};
 }
 
 /// Mixed second derivative of the point along a and b.
-inline Vector3 second(const Curve& f, double ux, double uy, const Direction& a,
-                      const Direction& b) noexcept {
-  const double ab = a.x * b.x + a.y * b.y;
-  const double both = a.along * b.along;
-  const double stretch = f.p1 * ab + f.p2 * both;
+template <class T>
+inline Vec3<T> second(const CurveOf<T>& f, T ux, T uy, const DirectionOf<T>& a,
+                      const DirectionOf<T>& b) noexcept {
+  const T ab = a.x * b.x + a.y * b.y;
+  const T both = a.along * b.along;
+  const T stretch = f.p1 * ab + f.p2 * both;
   return {f.p1 * (b.along * a.x + a.along * b.x) + stretch * ux,
           f.p1 * (b.along * a.y + a.along * b.y) + stretch * uy, f.q1 * ab + f.q2 * both};
 }
@@ -103,29 +111,35 @@ inline Vec3<T> rotate_back(const Turn& r, const Vec3<T>& v) noexcept {
 
 /// Coefficients of the angular velocity of S_i relative to S_{i-1}, written in S_{i-1}:
 /// xy = J (c1 a + c3 u (u . a)) with J (x, y) = (-y, x), z = c2 (u x a).
-struct Spin {
-  double c1, c2, c3;
-  double mixed;  ///< c3 + dc1/ds = (2 c3 - c2) / 2, of the symmetrized second derivative
-  double c3_1;   ///< 2 dc3/ds
-  double c2_1;   ///< dc2/ds
+template <class T>
+struct SpinOf {
+  T c1, c2, c3;
+  T mixed;  ///< c3 + dc1/ds = (2 c3 - c2) / 2, of the symmetrized second derivative
+  T c3_1;   ///< 2 dc3/ds
+  T c2_1;   ///< dc2/ds
 };
+using Spin = SpinOf<double>;
+
 template <class Functions>
-inline Spin spin(const Functions& c) noexcept {
-  return {c[1], c[2], c[3], c[3] - 0.5 * c[2], 3.0 * c[5] - c[4], c[4] - 0.5 * c[3]};
+inline auto spin(const Functions& c) noexcept {
+  using T = typename Functions::value_type;
+  return SpinOf<T>{c[1], c[2], c[3], c[3] - 0.5 * c[2], 3.0 * c[5] - c[4], c[4] - 0.5 * c[3]};
 }
 
-inline Vector3 first(const Spin& w, double ux, double uy, const Direction& a) noexcept {
-  const double along = w.c3 * a.along;
+template <class T>
+inline Vec3<T> first(const SpinOf<T>& w, T ux, T uy, const DirectionOf<T>& a) noexcept {
+  const T along = w.c3 * a.along;
   return {-(w.c1 * a.y + along * uy), w.c1 * a.x + along * ux, w.c2 * (ux * a.y - uy * a.x)};
 }
 
 /// Symmetrized second derivative: the axial vector of (d2R/dadb) R^T, halved over both orders.
-inline Vector3 second(const Spin& w, double ux, double uy, const Direction& a,
-                      const Direction& b) noexcept {
-  const double ab = a.x * b.x + a.y * b.y;
-  const double along = w.c3 * ab + w.c3_1 * a.along * b.along;
-  const double x = w.mixed * (b.along * a.x + a.along * b.x) + along * ux;
-  const double y = w.mixed * (b.along * a.y + a.along * b.y) + along * uy;
+template <class T>
+inline Vec3<T> second(const SpinOf<T>& w, T ux, T uy, const DirectionOf<T>& a,
+                      const DirectionOf<T>& b) noexcept {
+  const T ab = a.x * b.x + a.y * b.y;
+  const T along = w.c3 * ab + w.c3_1 * a.along * b.along;
+  const T x = w.mixed * (b.along * a.x + a.along * b.x) + along * ux;
+  const T y = w.mixed * (b.along * a.y + a.along * b.y) + along * uy;
   return {-y, x, w.c2_1 * (b.along * (ux * a.y - uy * a.x) + a.along * (ux * b.y - uy * b.x))};
 }
 

@@ -1,6 +1,6 @@
-// Vectors of three for the hot loops. A component is a double, or a Pair holding the two columns
-// u_x, u_y of a segment side by side, so that what is done to both columns is done once and in one
-// register.
+// Vectors of three for the hot loops. A component is a double; a Pair holding the two columns u_x,
+// u_y of a segment side by side; or Lanes, the same number of four neighbouring segments. What is
+// done to all of them is then done once and in one register (or in two, on a machine without AVX).
 #pragma once
 
 #include <Eigen/Core>
@@ -8,6 +8,8 @@
 namespace softarm {
 
 using Pair = double __attribute__((vector_size(16)));
+using Lanes = double __attribute__((vector_size(32)));
+inline constexpr int kLanes = 4;
 
 template <class T>
 struct Vec3 {
@@ -47,6 +49,7 @@ inline auto cross(const Vec3<S>& a, const Vec3<T>& b) noexcept {
   return Vec3<R>{a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
 inline Vector3 column(const PairVector3& v, int k) noexcept { return {v.x[k], v.y[k], v.z[k]}; }
+inline Vector3 lane(const Vec3<Lanes>& v, int k) noexcept { return {v.x[k], v.y[k], v.z[k]}; }
 
 inline Vector3 from_eigen(const Eigen::Vector3d& v) noexcept { return {v.x(), v.y(), v.z()}; }
 inline Eigen::Vector3d to_eigen(const Vector3& v) noexcept { return {v.x, v.y, v.z}; }
