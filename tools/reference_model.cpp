@@ -90,8 +90,8 @@ struct Arm {
   std::vector<Segment> segments;
   Rotation end;  ///< of the last segment
 
-  Arm(const ArmParameters& arm, const Vector& u, const Vector& velocity, const Matrix3& base)
-      : end(constant(base)) {
+  Arm(const ArmParameters& arm, const Vector& u, const Vector& velocity)
+      : end(constant(Matrix3::Identity())) {
     for (int i = 0; i < arm.size(); ++i) {
       Segment s;
       s.ux = {u(2 * i), velocity(2 * i)};
@@ -209,26 +209,25 @@ Quadrature make_gauss_legendre(int order) {
 }  // namespace
 
 std::array<Real, 12> entire_functions(Real s) {
+  static const std::array<Real, 70> inverse_factorial = [] {
+    std::array<Real, 70> inverse{1};
+    for (std::size_t k = 1; k < inverse.size(); ++k) {
+      inverse[k] = inverse[k - 1] / static_cast<Real>(k);
+    }
+    return inverse;
+  }();
   std::array<Real, 12> c{};
   if (s < 64) {
+    const std::size_t terms = s < 1 ? 11 : s < 16 ? 20 : 29;  // the first left out is below 1e-21
     for (std::size_t k = 0; k < c.size(); ++k) {
-      Real term = 1;
-      for (std::size_t i = 2; i <= k; ++i) term /= static_cast<Real>(i);
-      for (std::size_t j = 1; j < 60; ++j) {
-        c[k] += term;
-        term *= -s / (static_cast<Real>(k + 2 * j) * static_cast<Real>(k + 2 * j - 1));
-      }
+      for (std::size_t j = terms; j-- > 0;) c[k] = inverse_factorial[k + 2 * j] - s * c[k];
     }
     return c;
   }
   const Real theta = std::sqrt(s);
   c[0] = std::cos(theta);
   c[1] = std::sin(theta) / theta;
-  Real inverse_factorial = 1;
-  for (std::size_t k = 0; k + 2 < c.size(); ++k) {
-    if (k > 0) inverse_factorial /= static_cast<Real>(k);
-    c[k + 2] = (inverse_factorial - c[k]) / s;
-  }
+  for (std::size_t k = 0; k + 2 < c.size(); ++k) c[k + 2] = (inverse_factorial[k] - c[k]) / s;
   return c;
 }
 
@@ -240,7 +239,9 @@ const Quadrature& gauss_legendre(int order) {
 }
 
 Kinematics kinematics(const ArmParameters& arm, const Vector& u, const Vector& velocity) {
-  const Arm chain(arm, u, velocity, arm.base_rotation.cast<Real>());
+  // In the axes of S_0 first: the base's rotation need not be orthogonal to more than a double.
+  const Matrix3 base = arm.base_rotation.cast<Real>();
+  const Arm chain(arm, u, velocity);
   const auto n = chain.segments.size();
   Kinematics out;
   out.centres.resize(3, arm.size());
@@ -251,18 +252,18 @@ Kinematics kinematics(const ArmParameters& arm, const Vector& u, const Vector& v
   for (std::size_t i = 0; i < n; ++i) {
     const Segment& s = chain.segments[i];
     const Centre own = centre(arm.segments[i].length_m, s.ux, s.uy);
-    out.centres.col(static_cast<Eigen::Index>(i)) = position + values(s.base * own.point);
-    position += values(s.tip);
+    out.centres.col(static_cast<Eigen::Index>(i)) = position + base * values(s.base * own.point);
+    position += base * values(s.tip);
     out.positions.push_back(position);
-    out.rotations.push_back(values(i + 1 < n ? chain.segments[i + 1].base : chain.end));
+    out.rotations.push_back(base * values(i + 1 < n ? chain.segments[i + 1].base : chain.end));
   }
   std::vector<Triple> columns(2 * n);
   chain.ancestors(n, Triple{}, columns);
   for (std::size_t k = 0; k < 2 * n; ++k) {
     const auto col = static_cast<Eigen::Index>(k);
-    out.jacobian.col(col) = values(columns[k]);
-    out.jacobian_rate.col(col) = rates(columns[k]);
-    out.angular_jacobian.col(col) = values(chain.segments[k / 2].angular_column[k % 2]);
+    out.jacobian.col(col) = base * values(columns[k]);
+    out.jacobian_rate.col(col) = base * rates(columns[k]);
+    out.angular_jacobian.col(col) = base * values(chain.segments[k / 2].angular_column[k % 2]);
   }
   return out;
 }
@@ -275,7 +276,7 @@ Dynamics dynamics(const ArmParameters& arm, const Vector& u, const Vector& veloc
   Dynamics out;
   out.B = out.C = Matrix::Zero(dof, dof);
   out.G = out.s = out.r = Vector::Zero(dof);
-  const Arm chain(arm, u, velocity, Matrix3::Identity());
+  const Arm chain(arm, u, velocity);
   SegmentMasses masses(chain, gravity, out);
   Real total = 0;
   for (std::size_t m = 0; m < chain.segments.size(); ++m) {
@@ -300,11 +301,13 @@ Dynamics dynamics(const ArmParameters& arm, const Vector& u, const Vector& veloc
   out.w = std::sqrt(total) * gravity.norm();
   out.kinetic_energy = velocity.dot(out.B * velocity) / 2;
   const Matrix3X centres = kinematics(arm, u, velocity).centres;
+  const Vector3 weight = arm.gravity_mps2.cast<Real>();
+  Real reach = arm.base_position_m.cast<Real>().norm();
   for (int i = 0; i < arm.size(); ++i) {
-    const Real share = arm.segments[static_cast<std::size_t>(i)].mass_kg *
-                       arm.gravity_mps2.cast<Real>().dot(centres.col(i));
-    out.gravity_potential -= share;
-    out.potential_scale += std::abs(share);
+    const SegmentParameters& segment = arm.segments[static_cast<std::size_t>(i)];
+    reach += segment.length_m;
+    out.gravity_potential -= segment.mass_kg * weight.dot(centres.col(i));
+    out.potential_scale += segment.mass_kg * weight.norm() * reach;
   }
   return out;
 }

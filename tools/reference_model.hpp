@@ -48,7 +48,7 @@ struct Dynamics {
   Vector r;                                        ///< r_j = sqrt(sum mu |J_j-dot|^2)
   Real w = 0;                                      ///< sqrt(sum mu) |g|
   Real kinetic_energy = 0, gravity_potential = 0;  ///< J
-  Real potential_scale = 0;                        ///< sum mu |g . c|, J
+  Real potential_scale = 0;                        ///< sum mu |g| (|p0| + arc length to the end), J
 };
 
 /// B, C, G and the energies in u.
