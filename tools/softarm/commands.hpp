@@ -6,6 +6,9 @@
 
 namespace softarm {
 
+/// softarm bench model [--json] [--seconds S] [--golden FILE]
+void add_bench_command(CLI::App& app);
+
 /// softarm check CONFIG | --template
 void add_check_command(CLI::App& app);
 

@@ -1,0 +1,30 @@
+// The inputs that every method of the benchmark gets: one arm, many random states, in both
+// coordinates.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "softarm/control/reference.hpp"
+#include "softarm/model/arm.hpp"
+
+namespace softarm {
+
+/// One state and one reference, 2n numbers each; polar q = [phi, theta] and the same in u.
+struct BenchState {
+  Eigen::VectorXd q, q_velocity, q_acceleration;
+  Eigen::VectorXd u, velocity, acceleration;
+  ReferenceWindow reference;  ///< without a valve lag; with its polar form
+};
+
+struct BenchInputs {
+  ArmParameters arm;  ///< n of the paper's segments (section VII), hanging
+  std::vector<BenchState> states;
+};
+
+/// theta from 0.1 to 1.5 rad, any phi, speeds to 2 rad/s, accelerations to 5 rad/s^2: inside what
+/// every method, KDL's chain included, evaluates well. As many states as fit a first-level cache,
+/// 8 to 64. Deterministic.
+BenchInputs bench_inputs(int segments);
+
+}  // namespace softarm
