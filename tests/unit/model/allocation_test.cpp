@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "random_arm.hpp"
+#include "softarm/model/augmented_robot.hpp"
 #include "softarm/model/dynamics.hpp"
 #include "softarm/model/kinematics.hpp"
 #include "softarm/model/polar.hpp"
@@ -24,6 +25,26 @@ extern "C" void* malloc(std::size_t size) {  // operator new and Eigen both end 
 
 namespace softarm {
 namespace {
+
+TEST(Allocation, NoneInTheAugmentedRobot) {
+#ifdef SOFTARM_COUNTS_MALLOC
+  testing_support::RandomArm random(2);
+  for (const int n : {1, 5, 40}) {
+    AugmentedRobot robot(random.arm(n, MassModel::point));
+    Eigen::MatrixXd B_xi(10 * n, 10 * n), C_xi(10 * n, 10 * n);
+    Eigen::Matrix3Xd J_xi(3, 10 * n);
+    Eigen::VectorXd G_xi(10 * n);
+    const Eigen::VectorXd q = random.vector(2 * n, 3.0), v = random.vector(2 * n, 2.0);
+    const long before = allocations.load();
+    robot.update(q, v);
+    robot.rigid_dynamics(B_xi, C_xi, G_xi);
+    robot.rigid_tip_jacobian(J_xi);
+    EXPECT_EQ(allocations.load() - before, 0) << n;
+  }
+#else
+  GTEST_SKIP() << "malloc belongs to the sanitizer here";
+#endif
+}
 
 TEST(Allocation, NoneInTheLoop) {
 #ifdef SOFTARM_COUNTS_MALLOC
