@@ -58,7 +58,12 @@ void fill_from_pipeline(const ControlPipeline& pipeline, const ArmParameters& ar
       Eigen::Map<const Eigen::VectorXd>(estimate.length_error_m.data(), arm.size());
   row.commanded = output.pressure_bar;
   row.tip_reference.reset();
-  if (row.reference.size() > 0) row.tip_reference = tip_position(arm, row.reference);
+  row.tip_is_asked = row.reference.size() > 0 && output.reference.has_tip;
+  if (row.tip_is_asked) {
+    row.tip_reference = output.reference.tip.position_m;
+  } else if (row.reference.size() > 0) {
+    row.tip_reference = tip_position(arm, row.reference);
+  }
 }
 
 }  // namespace softarm

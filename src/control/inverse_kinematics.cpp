@@ -1,5 +1,8 @@
 #include "softarm/control/inverse_kinematics.hpp"
 
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+
 namespace softarm {
 namespace {
 
@@ -25,6 +28,21 @@ double manipulability_ratio(const Eigen::Ref<const Eigen::Matrix3Xd>& jacobian) 
   const Eigen::Matrix3d M = jacobian * jacobian.transpose();
   const double mean = M.trace() / 3.0;
   return SymmetricInverse(M).determinant / (mean * mean * mean);
+}
+
+Eigen::Matrix3d damped_inverse(const Eigen::Ref<const Eigen::Matrix3Xd>& jacobian,
+                               double hard_mprad) noexcept {
+  const Eigen::Matrix3d M = jacobian * jacobian.transpose();
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen;
+  eigen.computeDirect(M);
+  const double h = 0.25 * hard_mprad * hard_mprad;
+  Eigen::Vector3d f;
+  for (int i = 0; i < 3; ++i) {
+    const double x = std::max(eigen.eigenvalues()[i], 0.0);  // J J' has none below 0 but round-off
+    const double missing = std::max(1.0 - x / (4.0 * h), 0.0);
+    f[i] = 1.0 / (x + h * missing * missing);
+  }
+  return eigen.eigenvectors() * f.asDiagonal() * eigen.eigenvectors().transpose();
 }
 
 bool inverse_kinematics(const InverseKinematicsGains& gains,

@@ -4,10 +4,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <stdexcept>
 
 #include "control/blend.hpp"
 #include "control/reference_curves.hpp"
+#include "control/task_space_path.hpp"
+#include "control/task_space_tracker.hpp"
+#include "softarm/model/kinematics.hpp"
 
 namespace softarm {
 namespace {
@@ -30,6 +34,7 @@ void resize(ReferenceSample& sample, int dof) noexcept {
   sample.acceleration.resize(dof);
   sample.has_polar = false;
   sample.limited = false;
+  sample.has_tip = false;
 }
 
 /// Bends u inside of theta < limit: theta -> knee + w tanh((theta - knee) / w), w = limit - knee;
@@ -72,13 +77,19 @@ struct Reference::State {
     double peak_speed_radps = 0.0;
     Blend join;
     Message message;
+    std::optional<TaskSpaceTracker> tracker;  ///< where the phase is in task space
   };
 
+  ArmParameters arm;
   int dof = 0;
   ControllerSettings control;
   std::vector<Phase> phases;
   bool started = false;
   double start_s = 0.0;
+  int entered = 0;  ///< phases in task space begin and end when advance() says so
+  bool tip_seen = false;
+  double tip_time_s = 0.0;
+  Eigen::Vector3d tip_m = Eigen::Vector3d::Zero();
   ReferenceSample from, to;  ///< scratch
   SegmentVector offset, offset_rate, zero;
 
@@ -87,24 +98,32 @@ struct Reference::State {
   void unlimited(int index, double time_s, ReferenceSample& out) const noexcept;
   double blend_duration(const SegmentVector& d, double peak_speed_radps) const noexcept;
   void join(int index) noexcept;
+  void join_following(int index) noexcept;
   void join_message(Phase& phase, double time_s) noexcept;
 };
 
 const Reference::State::Phase& Reference::State::at(double time_s, int& index) const noexcept {
-  index = static_cast<int>(phases.size()) - 1;
-  while (index > 0 && time_s < phases[static_cast<std::size_t>(index)].begin_s) --index;
-  return phases[static_cast<std::size_t>(index)];
+  const auto phase = [this](int i) -> const Phase& { return phases[static_cast<std::size_t>(i)]; };
+  int last = entered;
+  const int count = static_cast<int>(phases.size());
+  while (last + 1 < count && !phase(last).tracker && !phase(last + 1).tracker) ++last;
+  index = last;
+  while (index > 0 && time_s < phase(index).begin_s) --index;
+  return phase(index);
 }
 
 // The phase's own curve at a time since its beginning.
 void Reference::State::curve(const Phase& phase, double time_s,
                              ReferenceSample& out) const noexcept {
   resize(out, dof);
+  if (phase.tracker) return phase.tracker->sample(phase.begin_s + time_s, out);
   const auto* live = std::get_if<LiveReference>(&phase.kind);
   if (live == nullptr) {
     std::visit(
         [&](const auto& kind) {
-          if constexpr (!std::is_same_v<std::decay_t<decltype(kind)>, LiveReference>) {
+          using Kind = std::decay_t<decltype(kind)>;
+          if constexpr (!std::is_same_v<Kind, LiveReference> &&
+                        !std::is_same_v<Kind, TipPathReference>) {
             evaluate(kind, time_s, out);
           }
         },
@@ -144,6 +163,13 @@ double Reference::State::blend_duration(const SegmentVector& d, double peak) con
 // Joins phase `index` to `from` (u, velocity), what the reference is just before it.
 void Reference::State::join(int index) noexcept {
   Phase& phase = phases[static_cast<std::size_t>(index)];
+  if (phase.tracker) {
+    // The tip was measured a little ago: so the model's tip is taken then, too.
+    offset = from.u - std::max(start_s + phase.begin_s - tip_time_s, 0.0) * from.velocity;
+    const Eigen::Vector3d off =
+        tip_seen ? (tip_m - tip_position(arm, offset)).eval() : Eigen::Vector3d::Zero();
+    return phase.tracker->start(phase.begin_s, from.u, from.velocity, off);
+  }
   if (std::holds_alternative<LiveReference>(phase.kind)) {
     phase.message.received = false;
     phase.message.u = from.u;
@@ -154,6 +180,15 @@ void Reference::State::join(int index) noexcept {
   offset = from.u - to.u;
   offset_rate = from.velocity - to.velocity;
   phase.join.set(0.0, blend_duration(offset, phase.peak_speed_radps), offset, offset_rate, zero);
+}
+
+// Joins what follows phase `index` and is known beforehand.
+void Reference::State::join_following(int index) noexcept {
+  for (std::size_t i = static_cast<std::size_t>(index) + 1; i < phases.size(); ++i) {
+    if (phases[i - 1].tracker || phases[i].tracker) return;
+    unlimited(static_cast<int>(i) - 1, phases[i].begin_s, from);
+    join(static_cast<int>(i));
+  }
 }
 
 // The message in `to` (u, velocity, acceleration) takes over from the curve in `from`. What the
@@ -190,7 +225,22 @@ void Reference::State::join_message(Phase& phase, double time_s) noexcept {
 
 Reference::Reference(const ReferenceSettings& settings, const ControllerSettings& control,
                      int segments)
+    : Reference(settings, control, [&] {
+        for (const ReferencePhase& phase : settings.phases) {
+          if (std::holds_alternative<TipPathReference>(phase.kind)) {
+            throw std::invalid_argument(
+                "reference: expected an arm for a path of the tip, got none");
+          }
+        }
+        ArmParameters arm;
+        arm.segments.resize(static_cast<std::size_t>(std::max(segments, 0)));
+        return arm;
+      }()) {}
+
+Reference::Reference(const ReferenceSettings& settings, const ControllerSettings& control,
+                     const ArmParameters& arm)
     : state_(std::make_unique<State>()) {
+  const int segments = arm.size();
   if (segments < 1 || segments > kMaxSegments) {
     throw std::invalid_argument(
         fmt::format("reference: expected 1 to {} segments, got {}", kMaxSegments, segments));
@@ -205,6 +255,7 @@ Reference::Reference(const ReferenceSettings& settings, const ControllerSettings
         "got {}, {}, {} and {}",
         control.max_theta_rad, control.max_speed_radps, control.max_step_rad, control.blend_s));
   }
+  state_->arm = arm;
   state_->dof = 2 * segments;
   state_->control = control;
   double begin = 0.0;
@@ -226,6 +277,9 @@ Reference::Reference(const ReferenceSettings& settings, const ControllerSettings
     made.message.velocity.setZero(state_->dof);
     made.message.acceleration.setZero(state_->dof);
     made.message.rest.resize(state_->dof);
+    if (const auto* path = std::get_if<TipPathReference>(&phase.kind)) {
+      made.tracker.emplace(arm, control, *path);
+    }
     state_->phases.push_back(std::move(made));
     begin += phase.duration_s;
   }
@@ -246,12 +300,39 @@ void Reference::start(double time_s, ConstVectorRef u, ConstVectorRef velocity) 
   State& s = *state_;
   s.started = true;
   s.start_s = time_s;
+  s.entered = 0;
   s.from.u = u;
   s.from.velocity = velocity;
-  for (int i = 0; i < static_cast<int>(s.phases.size()); ++i) {
-    if (i > 0) s.unlimited(i - 1, s.phases[static_cast<std::size_t>(i)].begin_s, s.from);
-    s.join(i);
+  s.join(0);
+  s.join_following(0);
+}
+
+void Reference::advance(double time_s) noexcept {
+  State& s = *state_;
+  if (!s.started) return;
+  const double time = time_s - s.start_s;
+  for (std::size_t next = static_cast<std::size_t>(s.entered) + 1;
+       next < s.phases.size() && time >= s.phases[next].begin_s; ++next) {
+    State::Phase &ends = s.phases[next - 1], &begins = s.phases[next];
+    if (ends.tracker) ends.tracker->advance(begins.begin_s);
+    if (ends.tracker || begins.tracker) {
+      s.unlimited(s.entered, begins.begin_s, s.from);
+      s.join(static_cast<int>(next));
+      s.join_following(static_cast<int>(next));
+    }
+    s.entered = static_cast<int>(next);
   }
+  State::Phase& now = s.phases[static_cast<std::size_t>(s.entered)];
+  if (now.tracker) now.tracker->advance(time);
+}
+
+void Reference::measure_tip(double time_s, const Eigen::Vector3d& tip_m) noexcept {
+  State& s = *state_;
+  s.tip_seen = true;
+  s.tip_time_s = time_s;
+  s.tip_m = tip_m;
+  State::Phase& now = s.phases[static_cast<std::size_t>(s.entered)];
+  if (s.started && now.tracker) now.tracker->measure(time_s - s.start_s, tip_m);
 }
 
 void Reference::sample(double time_s, ReferenceSample& out) const noexcept {
@@ -277,6 +358,7 @@ void Reference::window(double time_s, double lookahead_s, ReferenceWindow& out) 
   const State::Phase& phase = s.at(std::max(time_s - s.start_s, 0.0), index);
   double earliest = s.start_s;
   if (phase.message.received) earliest += phase.begin_s + phase.message.time_s;
+  if (phase.tracker) earliest += phase.begin_s;
   const double before = std::max(time_s - lookahead_s, std::min(earliest, time_s));
   sample(before, out.before);
   sample(time_s + lookahead_s, out.after);
@@ -313,10 +395,7 @@ LiveVerdict Reference::receive(double time_s, ConstVectorRef u, ConstVectorRef v
   s.offset = s.from.u - s.to.u;
   if (largest_norm(s.offset) > s.control.max_step_rad) return LiveVerdict::step_too_large;
   s.join_message(phase, local);
-  for (int i = index + 1; i < static_cast<int>(s.phases.size()); ++i) {
-    s.unlimited(i - 1, s.phases[static_cast<std::size_t>(i)].begin_s, s.from);
-    s.join(i);
-  }
+  s.join_following(index);
   return LiveVerdict::accepted;
 }
 

@@ -7,6 +7,8 @@
 #include <numbers>
 #include <stdexcept>
 
+#include "control/task_space_path.hpp"
+
 namespace softarm {
 namespace {
 
@@ -165,28 +167,29 @@ double largest_theta_rad(const ReferenceKind& kind) noexcept {
                                  }
                                  return theta;
                                },
-                               [](const LiveReference&) { return 0.0; }},
+                               [](const LiveReference&) { return 0.0; },
+                               [](const TipPathReference&) { return 0.0; }},
                     kind);
 }
 
 double largest_speed_radps(const ReferenceKind& kind) noexcept {
   return std::visit(
-      Overloaded{[](const SetPointReference&) { return 0.0; },
-                 [](const PaperReference& r) {
-                   const double rise = r.rise_s > 0.0 ? 0.5 * pi * r.theta_rad / r.rise_s : 0.0;
-                   return std::hypot(rise, r.theta_rad * r.phi_amplitude_rad * r.rate_radps);
-                 },
-                 [](const WayPointReference& r) {
-                   double speed = 0.0;
-                   for (std::size_t i = 1; i < r.points.size(); ++i) {
-                     const WayPoint &a = r.points[i - 1], &b = r.points[i];
-                     speed =
-                         std::max(speed, kQuinticPeakSpeed * largest_distance(a.u_rad, b.u_rad) /
-                                             (b.time_s - a.time_s));
-                   }
-                   return speed;
-                 },
-                 [](const LiveReference&) { return 0.0; }},
+      Overloaded{
+          [](const SetPointReference&) { return 0.0; },
+          [](const PaperReference& r) {
+            const double rise = r.rise_s > 0.0 ? 0.5 * pi * r.theta_rad / r.rise_s : 0.0;
+            return std::hypot(rise, r.theta_rad * r.phi_amplitude_rad * r.rate_radps);
+          },
+          [](const WayPointReference& r) {
+            double speed = 0.0;
+            for (std::size_t i = 1; i < r.points.size(); ++i) {
+              const WayPoint &a = r.points[i - 1], &b = r.points[i];
+              speed = std::max(speed, kQuinticPeakSpeed * largest_distance(a.u_rad, b.u_rad) /
+                                          (b.time_s - a.time_s));
+            }
+            return speed;
+          },
+          [](const LiveReference&) { return 0.0; }, [](const TipPathReference&) { return 0.0; }},
       kind);
 }
 
@@ -200,7 +203,8 @@ void check_phase(const std::string& where, const ReferenceKind& kind,
                             throw std::invalid_argument(fmt::format(
                                 "{}: expected a timeout (s) >= 0, got {}", where, r.timeout_s));
                           }
-                        }},
+                        },
+                        [&](const TipPathReference& r) { check_tip_path(where, r); }},
              kind);
   const double theta = largest_theta_rad(kind), speed = largest_speed_radps(kind);
   if (theta > control.max_theta_rad) {

@@ -25,7 +25,7 @@ ControlPipeline::ControlPipeline(const PipelineSettings& settings)
           body_noise(settings.estimation, settings.arm.size(), settings.daemon.bodies.base_id < 0)),
       filter_(settings.estimation, settings.arm.size()),
       safety_(settings.daemon.safety, period_s_),
-      reference_(settings.reference, settings.control, settings.arm.size()),
+      reference_(settings.reference, settings.control, settings.arm),
       controller_(settings.arm, settings.control),
       allocator_(settings.actuation),
       ramps_(settings.actuation),
@@ -56,6 +56,7 @@ const TickOutput& ControlPipeline::tick(const TickInput& input) noexcept {
   }
   take_reference(input);
   if (mode == Mode::active) {
+    reference_.advance(seconds(act_ns));
     reference_.window(seconds(act_ns), controller_.lookahead_s(), window_);
     control();
   }
@@ -125,6 +126,8 @@ void ControlPipeline::use_frame(const MocapFrame& frame) noexcept {
   if (validator_.identical_in_row() == 0) pressure_at_last_motion_bar_ = previous_bar_;
   newest_capture_ns_ = frame.capture_ns;
   output_.frame_number = frame.frame_number;
+  const BodyPose& tip = frame.body[static_cast<std::size_t>(settings_.arm.size())];
+  if (tip.valid) reference_.measure_tip(seconds(frame.capture_ns), tip.position_m);
 
   // Under control the arm is expected to do what it is told; the filter then smooths only the rest.
   const bool expects = safety_.mode() == Mode::active;

@@ -27,6 +27,14 @@ struct TipReference {
 /// direction.
 double manipulability_ratio(const Eigen::Ref<const Eigen::Matrix3Xd>& jacobian) noexcept;
 
+/// J^+ = J' X with X (3 x 3) = f(J J'): 1 / sigma^2 in directions in which the tip moves well
+/// (sigma, a singular value of J, at least `hard_mprad`), less in harder ones: f(x) = 1 / (x + h (1
+/// - x / 4h)^2), 4 h = hard_mprad^2. So |J^+ v| <= 1.3 / hard_mprad |v| wherever the arm is, J^+ is
+/// continuous with its first derivative in J, and exact, J J^+ = I, where no direction is hard.
+/// Closed form, no iteration. With n = 1 it is the least-squares solution in the plane of motion.
+Eigen::Matrix3d damped_inverse(const Eigen::Ref<const Eigen::Matrix3Xd>& jacobian,
+                               double hard_mprad) noexcept;
+
 /// Below this ratio (damping included) J J' counts as singular.
 inline constexpr double kMinManipulabilityRatio = 1e-12;
 

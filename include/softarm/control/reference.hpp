@@ -1,14 +1,17 @@
 // What the arm is asked to do: u_ref(t) with its first two derivatives, joined smoothly from
 // wherever the arm is.
 //
-//   Reference reference(settings, control, n);
+//   Reference reference(settings, control, arm);
+//   reference.measure_tip(capture_s, tip_m);          // every frame, for references of the tip
 //   reference.start(now_s, u, velocity);              // at ACTIVE, also after HOLD and VENT
+//   reference.advance(now_s);                         // every tick while ACTIVE
 //   reference.window(now_s, controller.lookahead_s(), samples);
 //   controller.compute(u, velocity, samples, output);
 #pragma once
 
 #include <memory>
 
+#include "softarm/control/inverse_kinematics.hpp"
 #include "softarm/control/settings.hpp"
 #include "softarm/model/arm.hpp"
 
@@ -27,6 +30,9 @@ struct ReferenceSample {
   SegmentVector polar_velocity;
   SegmentVector polar_acceleration;
   bool limited = false;  ///< a soft limit (theta or speed) bent this sample, or could not
+  /// Where the tip should be, in a phase that is given in task space; joining not counted.
+  bool has_tip = false;
+  TipReference tip;
 };
 
 /// A reference now and a little before and after, for the derivative that inverts the valve lag.
@@ -57,6 +63,11 @@ double largest_theta_rad(const ReferenceSettings& settings) noexcept;
 /// where max_speed_radps asks for it. An arm at rest on the reference thus follows it exactly.
 /// Phases of a sequence are joined in the same way.
 ///
+/// Task space: a phase with a path of the tip is followed by (21), integrated from what the
+/// reference is where the phase begins, with the tip as measured. It is then a function of time and
+/// of the measurements, and of how it is advanced; away from the time advanced to it is carried on
+/// with constant u''_ref, and so is what comes before such a phase until advance() enters it.
+///
 /// Soft limits: curves that would exceed max_theta_rad or max_speed_radps are refused at load or on
 /// reception. What a blend adds beyond 98 % of max_theta_rad is bent inside it radially (C2,
 /// derivatives exact), and flagged; a blend that still exceeds max_speed_radps is only flagged.
@@ -64,6 +75,9 @@ class Reference {
  public:
   /// Throws std::invalid_argument (phase, expected, got) for sizes, times or limits that do not
   /// fit.
+  Reference(const ReferenceSettings& settings, const ControllerSettings& control,
+            const ArmParameters& arm);
+  /// Where no phase is in task space, the number of segments is all that matters.
   Reference(const ReferenceSettings& settings, const ControllerSettings& control, int segments);
   ~Reference();
   Reference(Reference&&) noexcept;
@@ -73,8 +87,17 @@ class Reference {
   void start(double time_s, ConstVectorRef u, ConstVectorRef velocity) noexcept;
   bool started() const noexcept;
 
+  /// Lets a phase in task space go on to `time_s`, and such phases begin and end; nothing happens
+  /// for other phases. Bounded work. Does nothing before the first start().
+  void advance(double time_s) noexcept;
+
+  /// The tip (m, world frame) as measured at `time_s`; start() and phases in task space use the
+  /// newest.
+  void measure_tip(double time_s, const Eigen::Vector3d& tip_m) noexcept;
+
   /// The reference at any time; before the start it is what it is at the start. A function of time
-  /// alone between calls of start() and receive(). Unspecified before the first start().
+  /// alone between calls of start(), advance(), measure_tip() and receive(). Unspecified before the
+  /// first start().
   void sample(double time_s, ReferenceSample& out) const noexcept;
 
   /// `now`, and with lookahead_s > 0 also `before` and `after` by so much, not reaching back over

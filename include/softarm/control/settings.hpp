@@ -2,6 +2,7 @@
 // follows.
 #pragma once
 
+#include <Eigen/Core>
 #include <string>
 #include <variant>
 #include <vector>
@@ -24,6 +25,14 @@ struct ControlTerms {
   bool damping = true;    ///< D u'_ref
 };
 
+/// How a path of the tip becomes a motion of the segments: (21) as corrected, second order.
+struct TaskSpaceSettings {
+  double lambda_1ps = 6.0;  ///< the tip's error law has both poles at -lambda: Lambda_p = lambda^2,
+                            ///< Lambda_d = 2 lambda
+  double tip_bandwidth_radps = 10.0;  ///< of the filter on what the tip is off the reference's own
+  double posture_rate_1ps = 0.5;      ///< null space of J: u decays at this rate, towards less bend
+};
+
 struct ControllerSettings {
   ControlCoordinates coordinates = ControlCoordinates::u;
   ControlTerms terms;
@@ -39,7 +48,8 @@ struct ControllerSettings {
   double max_step_rad = 0.2;      ///< a larger jump of a live reference is refused
   double blend_s = 1.0;           ///< time in which a reference is joined from wherever the arm is
   double polar_theta_min_rad =
-      0.05;  ///< bounds A^-1 and the phi error near theta = 0 in polar mode
+      0.05;                      ///< bounds A^-1 and the phi error near theta = 0 in polar mode
+  TaskSpaceSettings task_space;  ///< for references of the tip
 };
 
 /// Hold u constant.
@@ -73,8 +83,23 @@ struct LiveReference {
   double timeout_s = 0.2;  ///< silence after which the last received u is held at rest
 };
 
-using ReferenceKind =
-    std::variant<SetPointReference, PaperReference, WayPointReference, LiveReference>;
+enum class TipPathShape {
+  point,      ///< p_d = centre
+  circle,     ///< p_d = centre + first_axis cos(rate t) + second_axis sin(rate t); an ellipse
+  lemniscate  ///< p_d = centre + first_axis cos(rate t) + second_axis sin(2 rate t)
+};
+
+/// Where the tip should be, in the world frame; the defaults are the paper's lemniscate (22).
+struct TipPathReference {
+  TipPathShape shape = TipPathShape::lemniscate;
+  Eigen::Vector3d centre_m = Eigen::Vector3d(-0.25, 0.0, -0.5);
+  Eigen::Vector3d first_axis_m = Eigen::Vector3d(0.0, 1.0 / 3.0, 0.0);
+  Eigen::Vector3d second_axis_m = Eigen::Vector3d(0.0, 0.0, 1.0 / 6.0);
+  double rate_radps = 0.6283185307179586;
+};
+
+using ReferenceKind = std::variant<SetPointReference, PaperReference, WayPointReference,
+                                   LiveReference, TipPathReference>;
 
 /// One phase of a sequence; the last one lasts for ever.
 struct ReferencePhase {

@@ -1,0 +1,30 @@
+#include "control/task_space_path.hpp"
+
+#include <cmath>
+#include <stdexcept>
+
+namespace softarm {
+
+TipReference evaluate(const TipPathReference& path, double time_s) noexcept {
+  TipReference out;
+  out.position_m = path.centre_m;
+  if (path.shape == TipPathShape::point) return out;
+  const double first = path.rate_radps;
+  const double second = path.shape == TipPathShape::lemniscate ? 2.0 * first : first;
+  const double cosine = std::cos(first * time_s), sine = std::sin(second * time_s);
+  out.position_m += path.first_axis_m * cosine + path.second_axis_m * sine;
+  out.velocity_mps = -path.first_axis_m * (first * std::sin(first * time_s)) +
+                     path.second_axis_m * (second * std::cos(second * time_s));
+  out.acceleration_mps2 =
+      -path.first_axis_m * (first * first * cosine) - path.second_axis_m * (second * second * sine);
+  return out;
+}
+
+void check_tip_path(const std::string& where, const TipPathReference& path) {
+  if (!path.centre_m.allFinite() || !path.first_axis_m.allFinite() ||
+      !path.second_axis_m.allFinite() || !std::isfinite(path.rate_radps)) {
+    throw std::invalid_argument(where + ": expected a path of finite numbers, got one that is not");
+  }
+}
+
+}  // namespace softarm

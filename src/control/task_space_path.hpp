@@ -1,0 +1,18 @@
+// Where the tip should be: points, circles and the lemniscate (22). Times count from the beginning
+// of the phase.
+#pragma once
+
+#include <string>
+
+#include "softarm/control/inverse_kinematics.hpp"
+#include "softarm/control/settings.hpp"
+
+namespace softarm {
+
+/// p_d, p_d', p_d'' in the world frame.
+TipReference evaluate(const TipPathReference& path, double time_s) noexcept;
+
+/// Throws std::invalid_argument, starting with `where`, for numbers that are not finite.
+void check_tip_path(const std::string& where, const TipPathReference& path);
+
+}  // namespace softarm
