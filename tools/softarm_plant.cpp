@@ -24,11 +24,13 @@ class PlantProcess {
         adapter_(experiment.daemon.bodies, experiment.plant.arm),
         node_(lcm_.url),
         arm_(experiment.plant, monotonic_now_ns()),
+        by_torque_(experiment.plant.actuation.kind == ActuationKind::torque),
         report_period_ns_(static_cast<std::int64_t>(1e9 / experiment.plant.mocap.rate_hz)) {
     // No exception may pass through LCM, so the handler only takes the message; the loop acts on
     // it.
     node_.subscribe(lcm_.command_channel, kCommandCapacity, [this](const ReceivedMessage& packet) {
-      command_received_ = decode(packet.bytes, command_message_);
+      command_received_ = by_torque_ ? decode(packet.bytes, torque_message_)
+                                     : decode(packet.bytes, command_message_);
     });
   }
 
@@ -78,13 +80,18 @@ class PlantProcess {
   }
 
   void take_command() {
-    pressure_bar_.assign(command_message_.pressure_bar.begin(),
-                         command_message_.pressure_bar.end());
+    by_torque_ ? take_command(torque_message_, torque_message_.torque_nm)
+               : take_command(command_message_, command_message_.pressure_bar);
+  }
+
+  template <class Message, class Values>
+  void take_command(const Message& message, const Values& values) {
+    pressure_bar_.assign(values.begin(), values.end());
     const bool was_vented = arm_.vented();
     const CommandVerdict verdict =
-        arm_.command({.sequence = command_message_.sequence,
-                      .validity_ns = std::int64_t{command_message_.validity_us} * 1000,
-                      .shadow = command_message_.shadow != 0,
+        arm_.command({.sequence = message.sequence,
+                      .validity_ns = std::int64_t{message.validity_us} * 1000,
+                      .shadow = message.shadow != 0,
                       .pressure_bar = pressure_bar_},
                      arm_now_ns());
     if (was_vented && verdict == CommandVerdict::in_force)
@@ -98,7 +105,7 @@ class PlantProcess {
     measurement_message_.sequence = arm_.sequence();
     measurement_message_.num_chambers = static_cast<std::int16_t>(pressure.size());
     measurement_message_.pressure_bar.assign(pressure.begin(), pressure.end());
-    node_.publish(lcm_.measurement_channel, measurement_message_);
+    if (!by_torque_) node_.publish(lcm_.measurement_channel, measurement_message_);
 
     const SegmentVector u = plant.u_rad();
     const SegmentVector velocity = plant.velocity_radps();
@@ -122,12 +129,14 @@ class PlantProcess {
   MocapAdapter adapter_;
   LcmNode node_;
   SimulatedArm arm_;
+  bool by_torque_;
   std::int64_t report_period_ns_;
   std::int64_t lost_ns_ = 0;
   bool command_received_ = false;
   std::vector<double> pressure_bar_;
   softarm_messages::mocap_frame_t frame_message_;
   softarm_messages::pressure_command_t command_message_;
+  softarm_messages::torque_command_t torque_message_;
   softarm_messages::pressure_measurement_t measurement_message_;
   softarm_messages::plant_state_t state_message_;
 };

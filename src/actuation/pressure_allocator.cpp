@@ -53,6 +53,17 @@ void check_chambers(int segment, const std::vector<Chamber>& chambers, bool plan
   }
 }
 
+void check_moments(int segment, const std::vector<Chamber>& moments,
+                   const ActuationSettings& settings) {
+  if (moments.size() != 2 || !(settings.max_pressure_bar > 0.0) ||
+      settings.min_pressure_bar != -settings.max_pressure_bar || settings.plane_rad) {
+    refuse(segment,
+           fmt::format("expected of actuation by torque two moments, limits -max and max "
+                       "(N m) and no plane, got {} moments and limits {} and {}",
+                       moments.size(), settings.min_pressure_bar, settings.max_pressure_bar));
+  }
+}
+
 template <int D>
 void check_span(int segment, const ChamberMap<D>& map, const ActuationSettings& settings) {
   const double weakest = map.weakest_torque_nm(), strongest = map.strongest_torque_nm();
@@ -91,6 +102,12 @@ PressureAllocator::PressureAllocator(const ActuationSettings& settings)
   if (planar_) plane_ = {-std::sin(*settings.plane_rad), std::cos(*settings.plane_rad)};
   for (int i = 0; i < segments_; ++i) {
     const std::vector<Chamber>& chambers = settings.segments[i];
+    if (settings.kind == ActuationKind::torque) {
+      check_moments(i, chambers, settings);
+      max_torque_nm_ = settings.max_pressure_bar;
+      chambers_ += 2;
+      continue;
+    }
     check_chambers(i, chambers, planar_);
     std::vector<std::array<double, 2>> spatial;
     std::vector<std::array<double, 1>> planar;
@@ -115,9 +132,12 @@ PressureAllocator::PressureAllocator(const ActuationSettings& settings)
   }
 }
 
-int PressureAllocator::first_chamber(int segment) const noexcept { return segment_[segment].first; }
+int PressureAllocator::first_chamber(int segment) const noexcept {
+  return max_torque_nm_ > 0.0 ? 2 * segment : segment_[segment].first;
+}
 
 int PressureAllocator::chambers_of(int segment) const noexcept {
+  if (max_torque_nm_ > 0.0) return 2;
   return planar_ ? segment_[segment].planar.size() : segment_[segment].spatial.size();
 }
 
@@ -125,6 +145,18 @@ void PressureAllocator::allocate(ConstVectorRef tau_actuation_nm, Allocation& ou
   out.pressures_bar.resize(chambers_);
   out.scale.resize(segments_);
   out.saturated = false;
+  if (max_torque_nm_ > 0.0) {
+    for (int i = 0; i < segments_; ++i) {
+      const Eigen::Vector2d tau = tau_actuation_nm.segment<2>(2 * i);
+      const double largest = tau.cwiseAbs().maxCoeff();
+      const bool finite = tau.allFinite();
+      out.scale[i] = !finite ? 0.0 : largest > max_torque_nm_ ? max_torque_nm_ / largest : 1.0;
+      out.pressures_bar.segment<2>(2 * i) =
+          finite ? Eigen::Vector2d(out.scale[i] * tau) : Eigen::Vector2d(Eigen::Vector2d::Zero());
+      out.saturated |= out.scale[i] < 1.0;
+    }
+    return;
+  }
   std::array<double, kMaxChambersPerSegment> pressures{};
   for (int i = 0; i < segments_; ++i) {
     const Segment& segment = segment_[i];
@@ -138,6 +170,10 @@ void PressureAllocator::allocate(ConstVectorRef tau_actuation_nm, Allocation& ou
 
 void PressureAllocator::torque(ConstVectorRef pressures_bar,
                                VectorRef tau_actuation_nm) const noexcept {
+  if (max_torque_nm_ > 0.0) {
+    tau_actuation_nm = pressures_bar;
+    return;
+  }
   for (int i = 0; i < segments_; ++i) {
     const double* pressures = pressures_bar.data() + segment_[i].first;
     if (planar_) {

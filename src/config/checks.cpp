@@ -66,11 +66,14 @@ class Checks {
     require(low <= bias && bias <= high, key + ".bias_pressure_bar",
             fmt::format("between min and max_pressure_bar ([{}, {}] bar)", low, high),
             fmt::format("{} bar", bias));
+    const bool torque = actuation.kind == ActuationKind::torque;
     const double vent_s = std::max(high, -low) / actuation.vent_bar_per_s;
-    require(vent_s < kLongestVent_s, key + ".vent_bar_per_s",
-            fmt::format("more than {} bar/s, so that venting takes less than {} s",
-                        std::max(high, -low) / kLongestVent_s, kLongestVent_s),
-            fmt::format("{} bar/s", actuation.vent_bar_per_s));
+    const char* unit = torque ? "N m/s" : "bar/s";
+    require(vent_s < kLongestVent_s, key + (torque ? ".vent_nm_per_s" : ".vent_bar_per_s"),
+            fmt::format("more than {} {}, so that venting takes less than {} s",
+                        std::max(high, -low) / kLongestVent_s, unit, kLongestVent_s),
+            fmt::format("{} {}", actuation.vent_bar_per_s, unit));
+    if (torque) return;
     const std::size_t fewest = actuation.plane_rad ? 2 : 3;
     for (const auto& chambers : actuation.segments) {
       require(chambers.size() >= fewest, key + ".chambers",
@@ -82,6 +85,12 @@ class Checks {
   }
 
   void check_same_chambers() const {
+    const bool torque = experiment_.actuation.kind == ActuationKind::torque;
+    require(experiment_.plant.actuation.kind == experiment_.actuation.kind, "plant.actuation.kind",
+            "the same as actuation.kind", torque ? "chambers" : "torque");
+    require(!torque || !experiment_.daemon.safety.valve_readback, "daemon.safety.valve_readback",
+            "false with actuation by torque: it is for simulated arms, which have no valves then",
+            "true");
     for (std::size_t i = 0; i < experiment_.actuation.segments.size(); ++i) {
       const auto commanded = experiment_.actuation.segments[i].size();
       const auto there = experiment_.plant.actuation.segments[i].size();
@@ -222,7 +231,7 @@ class Checks {
       std::make_unique<CurvatureController>(experiment_.arm, experiment_.control);
     });
     check_room("reference", "a reference that can be followed", [&] {
-      Reference reference(experiment_.reference, experiment_.control, experiment_.arm.size());
+      Reference reference(experiment_.reference, experiment_.control, experiment_.arm);
     });
   }
 

@@ -44,9 +44,14 @@ Experiment example_experiment() {
   example.plant.initial_u_rad.setZero(4);
   const std::vector<WayPoint> points = {
       {0.0, {0.0, 0.0, 0.0, 0.0}}, {2.0, {0.3, 0.0, 0.5, 0.0}}, {4.0, {0.0, 0.0, 0.0, 0.0}}};
+  TipPathReference tip;
+  tip.centre_m = {0.0, 0.0, -0.21};
+  tip.first_axis_m = {0.03, 0.0, 0.0};
+  tip.second_axis_m = {0.0, 0.02, 0.0};
   example.reference.phases = {{LiveReference{}, 5.0},
                               {SetPointReference{{0.2, 0.0, 0.2, 0.0}}, 5.0},
                               {WayPointReference{points, true}, 20.0},
+                              {tip, 10.0},
                               {PaperReference{}, 0.0}};
   return example;
 }

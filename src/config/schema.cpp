@@ -116,6 +116,7 @@ void describe_arm(SchemaVisitor& visitor, ArmParameters& arm) {
 }
 
 void describe_actuation(SchemaVisitor& visitor, ActuationSettings& actuation, int segments) {
+  if (describe_actuation_kind(visitor, actuation, segments) == ActuationKind::torque) return;
   const bool given = !actuation.segments.empty();
   actuation.segments.resize(static_cast<std::size_t>(segments));
   const auto same = [](const Chamber& a, const Chamber& b) {
@@ -226,6 +227,19 @@ void describe_control(SchemaVisitor& visitor, ControllerSettings& control, int s
   visitor.number({"polar_theta_min_rad", "rad",
                   "bounds A^-1 and the phi error near theta = 0 in polar mode", above_to(0.0, 1.0)},
                  control.polar_theta_min_rad);
+  TaskSpaceSettings& tip = control.task_space;
+  visitor.section({"task_space", "", "references of the tip, by (21)"}, SectionKind::plain, [&] {
+    visitor.number(
+        {"lambda_1ps", "1/s", "both poles of the tip's error are at -lambda", above_to(0.0, 1e3)},
+        tip.lambda_1ps);
+    visitor.number(
+        {"tip_bandwidth_radps", "rad/s",
+         "of the filter on the measured tip minus the reference's own", above_to(0.0, 1e4)},
+        tip.tip_bandwidth_radps);
+    visitor.number({"posture_rate_1ps", "1/s",
+                    "at which what does not move the tip drifts to less bend", from_to(0.0, 100.0)},
+                   tip.posture_rate_1ps);
+  });
 }
 
 void describe_experiment(SchemaVisitor& visitor, Experiment& experiment) {

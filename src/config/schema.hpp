@@ -110,6 +110,9 @@ void describe_experiment(SchemaVisitor& visitor, Experiment& experiment);
 // Its parts, in files of their own.
 void describe_arm(SchemaVisitor& visitor, ArmParameters& arm);
 void describe_actuation(SchemaVisitor& visitor, ActuationSettings& actuation, int segments);
+/// Its first key, and all of them for actuation by torque.
+ActuationKind describe_actuation_kind(SchemaVisitor& visitor, ActuationSettings& actuation,
+                                      int segments);
 void describe_estimation(SchemaVisitor& visitor, EstimationSettings& estimation);
 void describe_control(SchemaVisitor& visitor, ControllerSettings& control, int segments);
 void describe_reference(SchemaVisitor& visitor, ReferenceSettings& reference, int segments);

@@ -45,7 +45,28 @@ void describe_way_points(SchemaVisitor& visitor, WayPointReference& reference, i
       });
 }
 
+constexpr int kFirstTipPath =
+    4;  ///< of the names of kinds: what follows are shapes of a tip's path
+
+void describe_tip_path(SchemaVisitor& visitor, TipPathReference& path) {
+  const auto vector = [&](const char* key, const char* doc, Eigen::Vector3d& value) {
+    std::vector<double> values(value.data(), value.data() + 3);
+    visitor.numbers({key, "m", doc, from_to(-1e3, 1e3)}, {Shape::Kind::list, 3}, values);
+    value = Eigen::Map<const Eigen::Vector3d>(values.data());
+  };
+  vector("centre_m", "of the path, or the point, in the world", path.centre_m);
+  if (path.shape == TipPathShape::point) return;
+  vector("first_axis_m", "times cos(rate t)", path.first_axis_m);
+  vector("second_axis_m", "times sin(rate t), in a lemniscate sin(2 rate t)", path.second_axis_m);
+  visitor.number({"rate_radps", "rad/s", "of the path", from_to(0.0, 1e3)}, path.rate_radps);
+}
+
 void set_kind(ReferenceKind& kind, int index) {
+  if (index >= kFirstTipPath) {
+    if (!std::holds_alternative<TipPathReference>(kind)) kind = TipPathReference{};
+    std::get<TipPathReference>(kind).shape = static_cast<TipPathShape>(index - kFirstTipPath);
+    return;
+  }
   if (static_cast<int>(kind.index()) == index) return;
   if (index == 0) kind = SetPointReference{};
   if (index == 1) kind = PaperReference{};
@@ -54,14 +75,20 @@ void set_kind(ReferenceKind& kind, int index) {
 }
 
 void describe_phase(SchemaVisitor& visitor, ReferencePhase& phase, bool last, int segments) {
-  static const std::array<const char*, 4> kKinds = {"set_point", "paper", "way_points", "live"};
+  static const std::array<const char*, 7> kKinds = {
+      "set_point", "paper", "way_points", "live", "tip_point", "tip_circle", "tip_lemniscate"};
   int index = static_cast<int>(phase.kind.index());
-  visitor.choice({"kind",
-                  "",
-                  "set_point: hold; paper: (24); way_points; live: what comes over LCM",
-                  {},
-                  kRequired},
-                 kKinds, index);
+  if (const auto* path = std::get_if<TipPathReference>(&phase.kind)) {
+    index = kFirstTipPath + static_cast<int>(path->shape);
+  }
+  visitor.choice(
+      {"kind",
+       "",
+       "set_point: hold; paper: (24); way_points; live: what comes over LCM; tip_...: a path of "
+       "the tip by (21), tip_lemniscate: (22)",
+       {},
+       kRequired},
+      kKinds, index);
   set_kind(phase.kind, index);
   if (!last) {
     visitor.number({"duration_s", "s", "of the phase; the last one lasts for ever and has none",
@@ -78,6 +105,8 @@ void describe_phase(SchemaVisitor& visitor, ReferencePhase& phase, bool last, in
     visitor.number(
         {"timeout_s", "s", "silence after which the last u is held at rest", above_to(0.0, 1e3)},
         live->timeout_s);
+  } else if (auto* path = std::get_if<TipPathReference>(&phase.kind)) {
+    describe_tip_path(visitor, *path);
   }
 }
 
@@ -156,41 +185,6 @@ void describe_bodies(SchemaVisitor& visitor, BodySettings& bodies, int segments)
       segments, bodies.segment_ids);
 }
 
-/// Factors on what the controller believes, applied before absolute values override it.
-void describe_mismatch(SchemaVisitor& visitor, PlantSettings& plant) {
-  const int n = plant.arm.size();
-  const auto factor = [&](const char* key, const char* doc, const auto& apply) {
-    std::vector<double> values(static_cast<std::size_t>(n), 1.0);
-    visitor.numbers({key, "", doc, above_to(0.0, 100.0)}, {Shape::Kind::scalar_or_list, n}, values);
-    for (std::size_t i = 0; i < values.size(); ++i) apply(i, values[i]);
-  };
-  auto& segments = plant.arm.segments;
-  factor("stiffness_factor", "of all segments, or a list",
-         [&](std::size_t i, double f) { segments[i].stiffness_nm_per_rad *= f; });
-  factor("damping_factor", "the same",
-         [&](std::size_t i, double f) { segments[i].damping_nms_per_rad *= f; });
-  factor("mass_factor", "the same", [&](std::size_t i, double f) { segments[i].mass_kg *= f; });
-  factor("gain_factor", "of the chambers of all segments, or a list", [&](std::size_t i, double f) {
-    for (Chamber& chamber : plant.actuation.segments[i]) chamber.gain_nm_per_bar *= f;
-  });
-}
-
-void describe_mocap(SchemaVisitor& visitor, MocapSettings& mocap) {
-  visitor.number({"rate_hz", "Hz", "frames a second", above_to(0.0, 1e4)}, mocap.rate_hz);
-  visitor.number({"latency_s", "s", "from capture to arrival", from_to(0.0, 1.0)}, mocap.latency_s);
-  visitor.number(
-      {"position_noise_m", "m", "standard deviation an axis of every body", from_to(0.0, 1.0)},
-      mocap.position_noise_m);
-  visitor.number(
-      {"orientation_noise_rad", "rad",
-       "standard deviation of the rotation vector an axis of every body", from_to(0.0, 1.0)},
-      mocap.orientation_noise_rad);
-  visitor.number({"dropout_probability", "", "of a whole frame, independent from frame to frame",
-                  from_to(0.0, 1.0)},
-                 mocap.dropout_probability);
-  visitor.flag({"noise_on_base", "", "the base is measured with noise too"}, mocap.noise_on_base);
-}
-
 }  // namespace
 
 void describe_pose(SchemaVisitor& visitor, std::vector<double>& u_rad, int segments,
@@ -252,55 +246,6 @@ void describe_daemon(SchemaVisitor& visitor, DaemonSettings& daemon, int segment
                   [&] { describe_realtime(visitor, daemon.realtime); });
   visitor.section({"lcm", "", "channels, distinct where two arms share a machine"},
                   SectionKind::plain, [&] { describe_lcm(visitor, daemon.lcm); });
-}
-
-void describe_plant(SchemaVisitor& visitor, Experiment& experiment) {
-  PlantSettings& plant = experiment.plant;
-  if (visitor.reading()) {
-    plant.arm = experiment.arm;
-    plant.actuation = experiment.actuation;
-    plant.valves.supply_pressure_bar = experiment.actuation.max_pressure_bar;
-    plant.seed = experiment.seed;
-  }
-  const int n = plant.arm.size();
-  visitor.section({"mismatch", "", "factors on what the controller believes"},
-                  SectionKind::input_only, [&] { describe_mismatch(visitor, plant); });
-  visitor.section({"arm", "", "keys of `arm` that differ here (not segments)"},
-                  SectionKind::defaults_elsewhere, [&] { describe_arm(visitor, plant.arm); });
-  visitor.section({"actuation", "", "keys of `actuation` that differ here"},
-                  SectionKind::defaults_elsewhere,
-                  [&] { describe_actuation(visitor, plant.actuation, n); });
-  visitor.section({"valves", "", "between commanded and real pressure"}, SectionKind::plain, [&] {
-    visitor.number(
-        {"lag_s", "s", "time constant; 0: the command is the pressure", from_to(0.0, 10.0)},
-        plant.valves.lag_s);
-    visitor.number(
-        {"supply_pressure_bar", "bar", "no pressure above it; left out: actuation.max_pressure_bar",
-         above_to(0.0, 100.0)},
-        plant.valves.supply_pressure_bar);
-  });
-  visitor.section({"mocap", "", "simulated motion capture"}, SectionKind::plain,
-                  [&] { describe_mocap(visitor, plant.mocap); });
-  visitor.section({"initial", "", "where the arm starts, at rest"}, SectionKind::plain, [&] {
-    std::vector<double> u(plant.initial_u_rad.data(),
-                          plant.initial_u_rad.data() + plant.initial_u_rad.size());
-    describe_pose(visitor, u, n, Presence::optional);
-    plant.initial_u_rad = Eigen::Map<const Eigen::VectorXd>(u.data(), 2 * n);
-  });
-  std::vector<double> force(plant.tip_force_n.data(), plant.tip_force_n.data() + 3);
-  visitor.numbers(
-      {"tip_force_n", "N", "constant external force at the tip, world frame", from_to(-1e4, 1e4)},
-      {Shape::Kind::list, 3}, force);
-  plant.tip_force_n = Eigen::Map<const Eigen::Vector3d>(force.data());
-  static const std::array<const char*, 3> kMethods = {"sdirk2", "cash4", "sdirk4"};
-  visitor.choice({"integrator", "", "diagonally implicit Runge-Kutta method of SUNDIALS ARKODE"},
-                 kMethods, plant.method);
-  visitor.number({"relative_tolerance", "", "of the integrator", from_to(1e-13, 1e-2)},
-                 plant.relative_tolerance);
-  visitor.number(
-      {"absolute_tolerance", "rad", "of the integrator, for u; 1000 times that for u' in rad/s",
-       from_to(1e-15, 1e-2)},
-      plant.absolute_tolerance);
 }
 
 }  // namespace softarm

@@ -66,8 +66,9 @@ Eigen::MatrixXd chamber_map(const ActuationSettings& actuation) {
       2 * static_cast<Eigen::Index>(actuation.segments.size()), count_chambers(actuation));
   if (actuation.kind == ActuationKind::torque) {
     for (Eigen::Index row = 0; row < map.rows(); row += 2) {
-      map(row, row + 1) = 1.0;  // A_chamber itself
-      map(row + 1, row) = -1.0;
+      const auto& moments = actuation.segments[static_cast<std::size_t>(row / 2)];
+      map(row, row + 1) = moments[1].gain_nm_per_bar;  // A_chamber itself, but for a mismatch
+      map(row + 1, row) = -moments[0].gain_nm_per_bar;
     }
     return map;
   }

@@ -56,6 +56,7 @@ DaemonLink::DaemonLink(const PipelineSettings& settings, Provenance provenance, 
       clock_(settings.daemon.capture_time, settings.daemon.safety.frame_latency_s),
       node_(settings.daemon.lcm.url),
       dof_(settings.arm.dof()),
+      by_torque_(settings.actuation.kind == ActuationKind::torque),
       frames_(kFrameCapacity),
       newest_measurement_ns_(kNever),
       reference_sequence_(kNever),
@@ -76,6 +77,10 @@ DaemonLink::DaemonLink(const PipelineSettings& settings, Provenance provenance, 
   command_message_.sequence = 0;
   command_message_.num_chambers = static_cast<std::int16_t>(chambers);
   command_message_.pressure_bar.assign(chambers, 0.0F);
+  torque_message_.shadow = command_message_.shadow;
+  torque_message_.validity_us = command_message_.validity_us;
+  torque_message_.num_moments = static_cast<std::int16_t>(chambers);
+  torque_message_.torque_nm.assign(chambers, 0.0);
   status_message_ = {};
   status_message_.version = std::move(provenance.version);
   status_message_.configuration_hash = static_cast<std::int64_t>(provenance.configuration_hash);
@@ -178,6 +183,14 @@ void DaemonLink::publish_command(std::int64_t now_ns, const TickOutput& output) 
   for (std::size_t j = 0; j < command_message_.pressure_bar.size(); ++j)
     command_message_.pressure_bar[j] =
         static_cast<float>(output.pressure_bar[static_cast<Eigen::Index>(j)]);
+  if (by_torque_) {
+    torque_message_.sequence = command_message_.sequence;
+    torque_message_.time_us = command_message_.time_us;
+    std::copy(output.pressure_bar.begin(), output.pressure_bar.end(),
+              torque_message_.torque_nm.begin());
+    if (!node_.publish(settings_.lcm.command_channel, torque_message_)) ++unsent_;
+    return;
+  }
   if (!node_.publish(settings_.lcm.command_channel, command_message_)) ++unsent_;
 }
 

@@ -62,6 +62,11 @@ bool decode(std::span<const std::byte> bytes,
 }
 
 bool decode(std::span<const std::byte> bytes,
+            softarm_messages::torque_command_t& message) noexcept {
+  return decode_list(bytes, 8 + 8 + 4 + 1, 8, kMaxChambers, message);
+}
+
+bool decode(std::span<const std::byte> bytes,
             softarm_messages::pressure_measurement_t& message) noexcept {
   return decode_list(bytes, 8 + 8, 4, kMaxChambers, message);
 }

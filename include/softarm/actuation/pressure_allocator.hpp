@@ -80,7 +80,8 @@ struct Allocation {
 };
 
 /// Every segment's chambers. A planar arm's out-of-plane torque is dropped both ways: its structure
-/// carries it.
+/// carries it. With actuation by torque the "pressures" are tau_A itself, shortened a segment where
+/// a component is beyond the limit.
 class PressureAllocator {
  public:
   /// Throws std::invalid_argument (segment, expected, got, cure) for a map that cannot reach every
@@ -114,6 +115,7 @@ class PressureAllocator {
   };
   int segments_ = 0;
   int chambers_ = 0;
+  double max_torque_nm_ = 0.0;  ///< of actuation by torque, 0 with chambers
   bool planar_ = false;
   std::array<double, 2> plane_{};  ///< direction of tau_A that bends in the plane
   std::vector<Segment> segment_;

@@ -21,8 +21,8 @@ enum class ActuationKind {
              ///< simulated arms only. What is named `_bar` then counts N m.
 };
 
-/// With `ActuationKind::torque` a segment has two "chambers", moments about x and y whose angles
-/// and gains mean nothing, and the limits are -max and max.
+/// With `ActuationKind::torque` a segment has two "chambers" of gain 1, the moments about x and y;
+/// their angles mean nothing, and the limits are -max and max.
 struct ActuationSettings {
   ActuationKind kind = ActuationKind::chambers;
   std::vector<std::vector<Chamber>>
@@ -38,7 +38,7 @@ struct ActuationSettings {
 /// Turns settings for `segments` segments into actuation by torque within +-`max_torque_nm`.
 inline void set_torque_actuation(ActuationSettings& settings, int segments, double max_torque_nm) {
   settings.kind = ActuationKind::torque;
-  settings.segments.assign(static_cast<std::size_t>(segments), std::vector<Chamber>(2));
+  settings.segments.assign(static_cast<std::size_t>(segments), std::vector<Chamber>(2, {0.0, 1.0}));
   settings.min_pressure_bar = -max_torque_nm;
   settings.max_pressure_bar = max_torque_nm;
   settings.bias_pressure_bar = 0.0;

@@ -9,6 +9,7 @@
 #include <softarm_messages/pressure_command_t.hpp>
 #include <softarm_messages/pressure_measurement_t.hpp>
 #include <softarm_messages/timing_t.hpp>
+#include <softarm_messages/torque_command_t.hpp>
 #include <string>
 #include <vector>
 
@@ -47,6 +48,7 @@ class DaemonLink {
   /// next call.
   TickInput collect(std::int64_t now_ns) noexcept;
 
+  /// Pressures, or torques where these actuate: another type, which no valve terminal decodes.
   void publish_command(std::int64_t now_ns, const TickOutput& output) noexcept;
   void publish_status(std::int64_t now_ns, const ControlPipeline& pipeline,
                       const LoopTiming& timing) noexcept;
@@ -68,6 +70,7 @@ class DaemonLink {
   ClockRelation clock_;
   LcmNode node_;
   int dof_;
+  bool by_torque_;
 
   // What the handlers fill during collect().
   std::vector<MocapFrame> frames_;
@@ -90,6 +93,7 @@ class DaemonLink {
   softarm_messages::operator_command_t operator_message_;
   softarm_messages::pressure_measurement_t measurement_message_;
   softarm_messages::pressure_command_t command_message_;
+  softarm_messages::torque_command_t torque_message_;
   softarm_messages::controller_status_t status_message_;
   softarm_messages::timing_t timing_message_;
 };

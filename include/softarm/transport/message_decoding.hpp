@@ -11,6 +11,7 @@
 #include <softarm_messages/pressure_command_t.hpp>
 #include <softarm_messages/pressure_measurement_t.hpp>
 #include <softarm_messages/timing_t.hpp>
+#include <softarm_messages/torque_command_t.hpp>
 #include <span>
 
 namespace softarm {
@@ -21,6 +22,7 @@ namespace softarm {
 bool decode(std::span<const std::byte> bytes, softarm_messages::mocap_frame_t& message) noexcept;
 bool decode(std::span<const std::byte> bytes,
             softarm_messages::pressure_command_t& message) noexcept;
+bool decode(std::span<const std::byte> bytes, softarm_messages::torque_command_t& message) noexcept;
 bool decode(std::span<const std::byte> bytes,
             softarm_messages::pressure_measurement_t& message) noexcept;
 bool decode(std::span<const std::byte> bytes,
