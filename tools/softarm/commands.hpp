@@ -12,7 +12,7 @@ void add_bench_command(CLI::App& app);
 /// softarm check CONFIG | --template
 void add_check_command(CLI::App& app);
 
-/// softarm eval FILE [--mass point|distributed] [--method direct]
+/// softarm eval FILE [--mass point|distributed] [--method direct|augmented]
 void add_eval_command(CLI::App& app);
 
 /// softarm import CSV MAP.yaml --out LOG

@@ -48,7 +48,12 @@ struct NamedTerm {
   EvalTerm term;
 };
 
+/// The route of evaluation: `direct` is what runs in the loop, `augmented` the paper's own.
+enum class EvalMethod { direct, augmented };
+
 /// Every term that the case's inputs allow, in the order in which they are printed.
-std::vector<NamedTerm> evaluate(const EvalCase& eval_case);
+/// @throws std::invalid_argument if the augmented robot cannot stand for the case: it knows polar
+/// coordinates and point masses.
+std::vector<NamedTerm> evaluate(const EvalCase& eval_case, EvalMethod method);
 
 }  // namespace softarm

@@ -1,6 +1,7 @@
 // softarm eval: the model's terms for given states, to compare with other programs.
 #include <cstdio>
 #include <memory>
+#include <stdexcept>
 #include <string>
 
 #include "json_writer.hpp"
@@ -40,7 +41,7 @@ void write_term(JsonWriter& json, const EvalTerm& term) {
   }
 }
 
-std::string evaluate_file(const std::string& file, MassModel mass) {
+std::string evaluate_file(const std::string& file, MassModel mass, EvalMethod method) {
   JsonWriter json;
   json.open_object();
   json.key("cases");
@@ -49,7 +50,7 @@ std::string evaluate_file(const std::string& file, MassModel mass) {
     one.arm.mass = mass;
     json.open_object();
     json.member("id", one.id);
-    for (const NamedTerm& term : evaluate(one)) {
+    for (const NamedTerm& term : evaluate(one, method)) {
       json.key(term.name);
       write_term(json, term.term);
     }
@@ -75,13 +76,21 @@ void add_eval_command(CLI::App& app) {
   command->add_option("--mass", options->mass, "where a segment's mass sits: point, distributed")
       ->check(CLI::IsMember({"point", "distributed"}))
       ->capture_default_str();
-  command->add_option("--method", options->method, "the route of evaluation: direct")
-      ->check(CLI::IsMember({"direct"}))
+  command
+      ->add_option("--method", options->method,
+                   "the route of evaluation: direct, or augmented (polar, point)")
+      ->check(CLI::IsMember({"direct", "augmented"}))
       ->capture_default_str();
   command->callback([options] {
     const MassModel mass = options->mass == "point" ? MassModel::point : MassModel::distributed;
-    const std::string text = evaluate_file(options->file, mass);
-    std::fwrite(text.data(), 1, text.size(), stdout);
+    const EvalMethod method =
+        options->method == "direct" ? EvalMethod::direct : EvalMethod::augmented;
+    try {
+      const std::string text = evaluate_file(options->file, mass, method);
+      std::fwrite(text.data(), 1, text.size(), stdout);
+    } catch (const std::invalid_argument& error) {
+      throw CLI::ValidationError("--method", error.what());
+    }
   });
 }
 
