@@ -17,7 +17,9 @@ using ConstMap = Eigen::Map<const Eigen::VectorXd>;
 using Map = Eigen::Map<Eigen::VectorXd>;
 
 constexpr long kMaxSteps = 1'000'000;  // in one call to advance
-constexpr double kMinStep_s = 1e-12;   // what needs less is not a motion of an arm
+// A step in the torque of a stiff arm asks for steps that are shorter by orders of magnitude.
+constexpr int kMaxErrorTestFailures = 40;
+constexpr double kMinStep_s = 1e-12;  // what needs less is not a motion of an arm
 
 /// What SUNDIALS hands back to us in its callbacks.
 struct Callbacks {
@@ -193,6 +195,7 @@ ArkodeIntegrator::ArkodeIntegrator(SecondOrderSystem& system, const IntegratorSe
   check(ARKStepSetInterpolantType(h.arkode, ARK_INTERP_LAGRANGE), "ARKStepSetInterpolantType");
   check(ARKStepSetInterpolantDegree(h.arkode, 0), "ARKStepSetInterpolantDegree");
   check(ARKStepSetMaxNumSteps(h.arkode, kMaxSteps), "ARKStepSetMaxNumSteps");
+  check(ARKStepSetMaxErrTestFails(h.arkode, kMaxErrorTestFailures), "ARKStepSetMaxErrTestFails");
   check(ARKStepSetMinStep(h.arkode, kMinStep_s), "ARKStepSetMinStep");
 }
 
