@@ -16,15 +16,16 @@ class SerialRobot;
 /// (5) to (13) in the paper's coordinates q = [phi_1, theta_1, ...], for theta of either sign: the
 /// reference for the direct route of dynamics.hpp and kinematics.hpp. Point masses only.
 ///
-/// Like the paper's, B of this route is singular where a theta_i is 0, and there phi_i's row and
-/// column are small differences: what joints 1 and 10 of segment i do to a later mass cancels up to
-/// theta_i. With eps the unit round-off and l the arm's length the columns of J keep an error of
-/// about eps l, so
-/// - every term holds 1e-12 of its largest entry at |theta| >= 1e-4, and for all theta down to 0 of
-///   the size it has in general (B: mu l^2, C: mu l^2 |q'|, G: mu |g| l);
-/// - in row phi_i the relative error is about eps / theta_i. Below theta_i = 1e-16 it has no digit
-///   left, unless the segment is the last one or all theta are that small.
-/// The direct route in u has no such loss.
+/// Accuracy, with eps the unit round-off and l the arm's length:
+/// - for any theta down to 0 every term is that of the direct route to 1e-12 of its largest entry.
+///   C and G may vanish as a whole by symmetry (C of one segment, G of a hanging arm, as all theta
+///   go to 0), and are then good to 16 eps of the size they have in general, |B| |q'| and mu |g| l:
+///   C of one segment at theta = 1e-4 to 4e-12 of its largest entry, as in the direct route;
+/// - row phi_i by itself loses eps / theta_i: what joints 1 and 10 of segment i do to the masses
+///   behind it cancels up to theta_i, and leaves an error of about 2 eps l in a column of J. At
+///   theta_i = 1e-8 half of the row's digits are left, at 1e-16 none. The direct route in u has no
+///   such loss, nor has this one where i is the last segment.
+/// B itself is singular where a theta_i is 0, as in the paper.
 ///
 /// No function but the constructor allocates. Not for use by two threads at a time. NaN in gives
 /// NaN out.
