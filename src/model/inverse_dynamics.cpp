@@ -15,14 +15,13 @@
 namespace softarm {
 namespace {
 
-Lanes load(const double* v, int stride, int count) noexcept {
-  return Lanes{v[0], count > 1 ? v[stride] : 0.0, count > 2 ? v[2 * stride] : 0.0,
-               count > 3 ? v[3 * stride] : 0.0};
-}
-
-DirectionOf<Lanes> load(const double* v, int count, Lanes ux, Lanes uy) noexcept {
-  return direction(ux, uy, load(v, 2, count), load(v + 1, 2, count));
-}
+/// Inputs of inverse_dynamics, 2n numbers each.
+struct Inputs {
+  const double* u;
+  const double* a;
+  const double* b;
+  const double* x;
+};
 
 /// Derivative along x, and twice along a and b.
 template <bool kInertia, bool kCoriolis, class Coefficients>
@@ -57,28 +56,17 @@ void own_arc(const DirectionOf<Lanes>& x, SegmentLanes& k) noexcept {
 /// What segments `begin` ... `begin + 3` do within their own frames; lanes beyond the last segment
 /// are straight and weigh nothing.
 template <MassModel kMass, bool kInertia, bool kCoriolis>
-void prepare(const ArmParameters& arm, const BilinearInputs& in, int begin,
-             SegmentLanes& k) noexcept {
-  static_assert(sizeof(SegmentParameters) % sizeof(double) == 0);
-  constexpr int kStride = sizeof(SegmentParameters) / sizeof(double);
+void prepare(const ArmParameters& arm, const Inputs& in, int begin, SegmentLanes& k) noexcept {
+  constexpr bool kArc = kMass == MassModel::distributed && (kInertia || kCoriolis);
   const int count = arm.size() - begin;
-  const SegmentParameters& segment = arm.segments[static_cast<std::size_t>(begin)];
-  const Lanes length = load(&segment.length_m, kStride, count);
-  k.mass = load(&segment.mass_kg, kStride, count);
   k.ux = load(in.u + 2 * begin, 2, count);
   k.uy = load(in.u + 2 * begin + 1, 2, count);
-  const Lanes s = k.ux * k.ux + k.uy * k.uy;
-  constexpr bool kArc = kMass == MassModel::distributed && (kInertia || kCoriolis);
-  const auto c = entire < kArc ? 12 : 8 > (s);
-  k.c0 = c[0];
-  k.tip = tip_curve(length, c);
-  k.centre = centre_curve(length, c);
-  k.turn_rate = spin(c);
+  set_shape<kArc>(arm, begin, k);
   DirectionOf<Lanes> x{};
-  if constexpr (kInertia) x = load(in.x + 2 * begin, count, k.ux, k.uy);
+  if constexpr (kInertia) x = load_direction(in.x + 2 * begin, count, k);
   if constexpr (kCoriolis) {
-    k.a = load(in.a + 2 * begin, count, k.ux, k.uy);
-    k.b = load(in.b + 2 * begin, count, k.ux, k.uy);
+    k.a = load_direction(in.a + 2 * begin, count, k);
+    k.b = load_direction(in.b + 2 * begin, count, k);
     k.spin_a = first(k.turn_rate, k.ux, k.uy, k.a);
     k.spin_b = first(k.turn_rate, k.ux, k.uy, k.b);
   } else if constexpr (kArc) {
@@ -89,10 +77,7 @@ void prepare(const ArmParameters& arm, const BilinearInputs& in, int begin,
     k.own_centre = own<kInertia, kCoriolis>(k.centre, k, x);
     k.own_spin = own<kInertia, kCoriolis>(k.turn_rate, k, x);
   }
-  if constexpr (kArc) {
-    k.arc = arc_moments(k.mass * length * length, s, c);
-    own_arc(x, k);
-  }
+  if constexpr (kArc) own_arc(x, k);
 }
 
 /// Motion of the frame S_{i-1}, in its own coordinates.
@@ -174,12 +159,8 @@ inline void arc_forces(const SegmentLanes& k, int l, const Vector3& weight,
   set_torque(ux, uy, on_p.x, on_p.y, stretch, out);
 }
 
-inline Turn turn(const SegmentLanes& k, int l) noexcept {
-  return {k.ux[l], k.uy[l], k.c0[l], k.turn_rate.c1[l], k.turn_rate.c2[l]};
-}
-
 template <MassModel kMass, bool kInertia, bool kCoriolis>
-void outward(const ArmParameters& arm, const BilinearInputs& in, Vector3 base, SegmentLanes* lanes,
+void outward(const ArmParameters& arm, const Inputs& in, Vector3 base, SegmentLanes* lanes,
              SegmentForces* out) noexcept {
   const int n = arm.size();
   FrameMotion m{{0, 0, 0}, {0, 0, 0}, {0, 0, 0}, base};
@@ -239,7 +220,7 @@ void inward(int n, const SegmentLanes* lanes, const SegmentForces* segments, dou
 }
 
 template <MassModel kMass>
-void outward(const ArmParameters& arm, const BilinearInputs& in, const DynamicsTerms& terms,
+void outward(const ArmParameters& arm, const Inputs& in, const DynamicsTerms& terms,
              const Vector3& base, DynamicsWorkspace::Storage& s) noexcept {
   const auto run =
       terms.inertia ? (terms.coriolis ? outward<kMass, true, true> : outward<kMass, true, false>)
@@ -253,7 +234,7 @@ void inverse_dynamics(const ArmParameters& arm, DynamicsWorkspace& workspace, Co
                       ConstVectorRef velocity_a, ConstVectorRef velocity_b,
                       ConstVectorRef acceleration, DynamicsTerms terms, VectorRef out) noexcept {
   auto& s = workspace.storage();
-  const BilinearInputs in{u.data(), velocity_a.data(), velocity_b.data(), acceleration.data()};
+  const Inputs in{u.data(), velocity_a.data(), velocity_b.data(), acceleration.data()};
   Vector3 base{0, 0, 0};
   if (terms.gravity) base = from_eigen(-(arm.base_rotation.transpose() * arm.gravity_mps2));
   if (arm.mass == MassModel::point) {

@@ -24,7 +24,7 @@ struct OwnColumns {
 
 /// State of one segment as its own mass sees it.
 struct OwnState {
-  double ux, uy, mass, length;
+  double ux, uy, mass;
   Direction v;   ///< u'
   Vector3 spin;  ///< angular velocity of S_{i-1}, in S_{i-1}
 };

@@ -1,34 +1,76 @@
-// What the recursion of inverse_dynamics needs of four neighbouring segments before it knows how
-// their frames move: one lane a segment, everything in the segment's own S_{i-1}.
+// Four neighbouring segments side by side, one lane a segment: what does not depend on how their
+// frames move waits for nobody and is done for all four at once.
 #pragma once
 
 #include "model/arc_moments.hpp"
+#include "softarm/model/arm.hpp"
 
 namespace softarm {
 
-/// The acceleration of a curve's point (P u, Q) within S_{i-1}, twice along a and b and once along
-/// x; `spin` likewise is the angular one. What the frame's own motion adds is in the recursion.
-struct SegmentLanes {
+/// Shape of four segments, each in its own S_{i-1}.
+struct ShapeLanes {
   Lanes ux, uy, c0;
   Lanes mass;
   CurveOf<Lanes> tip, centre;
   SpinOf<Lanes> turn_rate;
-  DirectionOf<Lanes> a, b;
-  Vec3<Lanes> spin_a, spin_b;  ///< angular velocity of S_i relative to S_{i-1} along a, b
-  Vec3<Lanes> own_tip, own_centre, own_spin;
-  /// Distributed mass: moments of the arc, and the integrals of P, Q and (P1 u, Q1) times the
-  /// acceleration within S_{i-1}.
-  ArcMomentsOf<Lanes> arc;
-  Vec3<Lanes> own_p, own_q;
-  Lanes own_stretch;
+  ArcMomentsOf<Lanes> arc;  ///< only where mass is distributed
 };
 
-/// Inputs of inverse_dynamics, 2n numbers each.
-struct BilinearInputs {
-  const double* u;
-  const double* a;
-  const double* b;
-  const double* x;
+/// v[0], v[stride], ... for `count` lanes, 0 beyond.
+inline Lanes load(const double* v, int stride, int count) noexcept {
+  return Lanes{v[0], count > 1 ? v[stride] : 0.0, count > 2 ? v[2 * stride] : 0.0,
+               count > 3 ? v[3 * stride] : 0.0};
+}
+
+/// Fills everything but ux and uy, which the caller has set, for the segments from `begin` on.
+/// Lanes beyond the last segment are straight and weigh nothing.
+template <bool kArc>
+inline void set_shape(const ArmParameters& arm, int begin, ShapeLanes& k) noexcept {
+  static_assert(sizeof(SegmentParameters) % sizeof(double) == 0);
+  constexpr int kStride = sizeof(SegmentParameters) / sizeof(double);
+  const int count = arm.size() - begin;
+  const SegmentParameters& segment = arm.segments[static_cast<std::size_t>(begin)];
+  const Lanes length = load(&segment.length_m, kStride, count);
+  const Lanes s = k.ux * k.ux + k.uy * k.uy;
+  const auto c = entire < kArc ? 12 : 8 > (s);
+  k.mass = load(&segment.mass_kg, kStride, count);
+  k.c0 = c[0];
+  k.tip = tip_curve(length, c);
+  k.centre = centre_curve(length, c);
+  k.turn_rate = spin(c);
+  if constexpr (kArc) k.arc = arc_moments(k.mass * length * length, s, c);
+}
+
+inline DirectionOf<Lanes> load_direction(const double* v, int count, const ShapeLanes& k) noexcept {
+  return direction(k.ux, k.uy, load(v, 2, count), load(v + 1, 2, count));
+}
+
+inline Turn turn(const ShapeLanes& k, int l) noexcept {
+  return {k.ux[l], k.uy[l], k.c0[l], k.turn_rate.c1[l], k.turn_rate.c2[l]};
+}
+inline Curve lane(const CurveOf<Lanes>& f, int l) noexcept {
+  return {f.p[l], f.q[l], f.p1[l], f.q1[l], f.p2[l], f.q2[l]};
+}
+inline Direction lane(const DirectionOf<Lanes>& d, int l) noexcept {
+  return {d.x[l], d.y[l], d.along[l]};
+}
+inline Spin lane(const SpinOf<Lanes>& w, int l) noexcept {
+  return {w.c1[l], w.c2[l], w.c3[l], w.mixed[l], w.c3_1[l], w.c2_1[l]};
+}
+
+inline ArcMoments lane(const ArcMomentsOf<Lanes>& m, int l) noexcept {
+  return {m.pp[l],  m.pq[l],  m.qq[l],  m.pp1[l],  m.pq1[l],  m.qp1[l],  m.qq1[l], m.pp2[l],
+          m.pq2[l], m.qp2[l], m.qq2[l], m.p1p1[l], m.q1q1[l], m.p1p2[l], m.q1q2[l]};
+}
+
+/// What inverse_dynamics adds: motion within S_{i-1}, twice along a and b and once along x.
+struct SegmentLanes : ShapeLanes {
+  DirectionOf<Lanes> a, b;
+  Vec3<Lanes> spin_a, spin_b;  ///< angular velocity of S_i relative to S_{i-1} along a, b
+  Vec3<Lanes> own_tip, own_centre, own_spin;  ///< accelerations, the last one angular
+  /// Distributed mass: integrals of P, Q and (P1 u, Q1) times the acceleration.
+  Vec3<Lanes> own_p, own_q;
+  Lanes own_stretch;
 };
 
 }  // namespace softarm

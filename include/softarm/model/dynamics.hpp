@@ -53,6 +53,14 @@ void dynamics_matrices(const ArmParameters& arm, DynamicsWorkspace& workspace, C
                        ConstVectorRef velocity, Eigen::Ref<Eigen::MatrixXd> B,
                        Eigen::Ref<Eigen::MatrixXd> C, VectorRef G) noexcept;
 
+/// The same in polar coordinates q = [phi_1, theta_1, ...] (rad), from the columns along phi and
+/// theta: B_q = P' B P, C_q = P' (B P_rate + C P), G_q = P' G with u' = P q'. The phi rows keep
+/// their relative accuracy down to theta = 0, where they vanish.
+void polar_dynamics_matrices(const ArmParameters& arm, DynamicsWorkspace& workspace,
+                             ConstVectorRef q, ConstVectorRef velocity,
+                             Eigen::Ref<Eigen::MatrixXd> B, Eigen::Ref<Eigen::MatrixXd> C,
+                             VectorRef G) noexcept;
+
 /// B alone, 2n x 2n, as `dynamics_matrices` gives it.
 void inertia_matrix(const ArmParameters& arm, DynamicsWorkspace& workspace, ConstVectorRef u,
                     Eigen::Ref<Eigen::MatrixXd> B) noexcept;
