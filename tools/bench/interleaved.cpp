@@ -12,6 +12,7 @@ namespace {
 
 constexpr double kSlot_ns = 0.5e6;
 constexpr double kLongCall_ns = 2e6;
+constexpr int kMostCalls = 1 << 20;  ///< a slot, where a call takes no time at all
 constexpr std::size_t kMinimumRounds = 3;
 
 double now_ns() {
@@ -49,13 +50,16 @@ void InterleavedTiming::add(std::function<void(int calls)> run) {
 }
 
 void InterleavedTiming::calibrate(Entry& entry) {
-  double call_ns = timed_ns(entry.run, 1);  // cold
-  while (call_ns * entry.calls < kSlot_ns) {
-    call_ns = timed_ns(entry.run, entry.calls);
-    if (call_ns * entry.calls >= 0.5 * kSlot_ns) break;
-    entry.calls *= 2;
+  constexpr int kTrials = 3;  // the fastest counts: the first is cold, any may be interrupted
+  double call_ns = 0.0;
+  for (entry.calls = 1;; entry.calls *= 2) {
+    call_ns = std::numeric_limits<double>::infinity();
+    for (int trial = 0; trial < kTrials; ++trial) {
+      call_ns = std::min(call_ns, timed_ns(entry.run, entry.calls));
+    }
+    if (call_ns * entry.calls >= 0.5 * kSlot_ns || entry.calls >= kMostCalls) break;
   }
-  entry.calls = std::max(1, static_cast<int>(kSlot_ns / std::max(call_ns, 1.0)));
+  entry.calls = static_cast<int>(std::clamp(kSlot_ns / call_ns, 1.0, 1.0 * kMostCalls));
   entry.every = call_ns > kLongCall_ns ? static_cast<int>(4.0 * call_ns / kLongCall_ns) : 1;
 }
 

@@ -4,6 +4,7 @@
 
 #include "bench/kdl_chain.hpp"
 #include "softarm/control/curvature_controller.hpp"
+#include "softarm/model/augmented_robot.hpp"
 #include "softarm/model/dynamics.hpp"
 #include "softarm/model/polar.hpp"
 
@@ -12,6 +13,17 @@ namespace {
 
 /// Beyond this KDL's O(n^2) matrices take a tenth of a second a call and say nothing new.
 constexpr int kKdlMatricesUpTo = 50;
+
+class Augmented : public Evaluator {
+ public:
+  explicit Augmented(const ArmParameters& arm) : robot_(arm) {}
+
+  void evaluate(const BenchState& s) override { robot_.update(s.q, s.q_velocity); }
+  MethodResult result() const override { return {robot_.B(), robot_.C(), robot_.G()}; }
+
+ private:
+  AugmentedRobot robot_;
+};
 
 class Matrices : public Evaluator {
  public:
@@ -123,7 +135,7 @@ const char* name(MassModel mass) noexcept {
 }
 
 std::vector<Method> bench_methods(int segments) {
-  std::vector<Method> methods;
+  std::vector<Method> methods = {{Route::augmented, true, MassModel::point}};
   for (const MassModel mass : {MassModel::point, MassModel::distributed}) {
     methods.push_back({Route::matrices, false, mass});
     methods.push_back({Route::matrices, true, mass});
@@ -152,7 +164,7 @@ std::unique_ptr<Evaluator> make_evaluator(const Method& method, ArmParameters ar
   arm.mass = method.mass;
   switch (method.route) {
     case Route::augmented:
-      break;
+      return std::make_unique<Augmented>(arm);
     case Route::matrices:
       return std::make_unique<Matrices>(arm, method.polar);
     case Route::recursion:
