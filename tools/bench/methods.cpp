@@ -6,7 +6,6 @@
 #include "softarm/control/curvature_controller.hpp"
 #include "softarm/model/augmented_robot.hpp"
 #include "softarm/model/dynamics.hpp"
-#include "softarm/model/polar.hpp"
 
 namespace softarm {
 namespace {
@@ -31,25 +30,19 @@ class Matrices : public Evaluator {
     result_.B.resize(arm.dof(), arm.dof());
     result_.C.resize(arm.dof(), arm.dof());
     result_.G.resize(arm.dof());
-    u_.resize(arm.dof());
-    velocity_.resize(arm.dof());
   }
 
   void evaluate(const BenchState& s) override {
     if (!polar_) {
       return dynamics_matrices(arm_, workspace_, s.u, s.velocity, result_.B, result_.C, result_.G);
     }
-    polar_to_u(s.q, u_);
-    polar_velocity_to_u(s.q, s.q_velocity, velocity_);
-    dynamics_matrices(arm_, workspace_, u_, velocity_, result_.B, result_.C, result_.G);
-    dynamics_to_polar(s.q, s.q_velocity, result_.B, result_.C, result_.G);
+    polar_dynamics_matrices(arm_, workspace_, s.q, s.q_velocity, result_.B, result_.C, result_.G);
   }
 
  private:
   ArmParameters arm_;
   DynamicsWorkspace workspace_;
   bool polar_;
-  Eigen::VectorXd u_, velocity_;
 };
 
 class Recursion : public Evaluator {
