@@ -7,7 +7,6 @@
 #include <string>
 
 #include "against_reference.hpp"
-#include "softarm/model/polar.hpp"
 
 namespace softarm {
 namespace {
@@ -33,16 +32,13 @@ constexpr const char* kPolarNames[] = {"B, polar", "C, polar", "G, polar"};
 /// B, C and G by the polar route, from q on, against the reference's chain rule.
 void add_polar(const ArmParameters& arm, RandomArm& random, Column& column) {
   const int dof = arm.dof();
-  Eigen::VectorXd q(dof), qd = random.vector(dof, 2.0), u(dof), v(dof), G(dof);
+  Eigen::VectorXd q(dof), qd = random.vector(dof, 2.0), G(dof);
   for (int i = 0; i < dof; i += 2) {
     q.segment<2>(i) << random.uniform(-4.0, 4.0), random.uniform(0.0, column.theta_rad);
   }
-  polar_to_u(q, u);
-  polar_velocity_to_u(q, qd, v);
   DynamicsWorkspace workspace(arm);
   Eigen::MatrixXd B(dof, dof), C(dof, dof);
-  dynamics_matrices(arm, workspace, u, v, B, C, G);
-  dynamics_to_polar(q, qd, B, C, G);
+  polar_dynamics_matrices(arm, workspace, q, qd, B, C, G);
   using reference::Vector;
   const Vector exact_q = q.cast<long double>(), exact_qd = qd.cast<long double>();
   const Vector exact_u = reference::polar_to_u(exact_q),

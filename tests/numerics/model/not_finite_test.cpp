@@ -126,6 +126,15 @@ std::vector<Function> functions() {
          u_to_polar(s.u, q);
          return Outputs{q};
        }},
+      {"polar_dynamics_matrices",
+       {true, true, false},
+       [](const auto& arm, const auto& s) {
+         DynamicsWorkspace workspace(arm);
+         Eigen::MatrixXd B(arm.dof(), arm.dof()), C = B;
+         Eigen::VectorXd G(arm.dof());
+         polar_dynamics_matrices(arm, workspace, s.u, s.v, B, C, G);
+         return Outputs{B, C, G};
+       }},
       {"polar route",
        {true, true, true},
        [](const auto& arm, const auto& s) {  // s.u is q here

@@ -32,16 +32,24 @@ class PolarHardCases : public ::testing::TestWithParam<MassModel> {
     const int dof = arm.dof();
     DynamicsWorkspace workspace(arm);
     Eigen::VectorXd u(dof), v(dof), G(dof);
+    Eigen::MatrixXd B(dof, dof), C(dof, dof);
+    polar_dynamics_matrices(arm, workspace, s.q, s.qd, B, C, G);
+    expect_equal(arm, s, theta, B, C, G);
     polar_to_u(s.q, u);
     polar_velocity_to_u(s.q, s.qd, v);
-    Eigen::MatrixXd B(dof, dof), C(dof, dof);
     dynamics_matrices(arm, workspace, u, v, B, C, G);
     dynamics_to_polar(s.q, s.qd, B, C, G);
+    expect_equal(arm, s, theta, B, C, G);
+  }
+
+  static void expect_equal(const ArmParameters& arm, const PolarState& s, double theta,
+                           const Eigen::MatrixXd& B, const Eigen::MatrixXd& C,
+                           const Eigen::VectorXd& G) {
+    const int dof = arm.dof();
     const Vector q = s.q.cast<Real>(), qd = s.qd.cast<Real>();
-    const Vector exact_u = reference::polar_to_u(q),
-                 exact_v = reference::polar_velocity_to_u(q, qd);
-    const auto want = reference::to_polar(reference::dynamics(arm, exact_u, exact_v), q, qd);
-    const Real speed = exact_v.cwiseAbs().maxCoeff();
+    const Vector u = reference::polar_to_u(q), v = reference::polar_velocity_to_u(q, qd);
+    const auto want = reference::to_polar(reference::dynamics(arm, u, v), q, qd);
+    const Real speed = v.cwiseAbs().maxCoeff();
     const Real bound = kUlp * 32 * (1 + Real(theta) * Real(theta)) * (1 + arm.size() / Real(10));
     for (int i = 0; i < dof; ++i) {
       ASSERT_LE(std::abs(G(i) - want.G(i)), bound * want.s(i) * want.w + 1e-322L) << "G " << i;
@@ -80,7 +88,7 @@ TEST_P(PolarHardCases, ChainRuleHoldsAtSpecialAngles) {
 
 TEST_P(PolarHardCases, ChainRuleHoldsForRandomStates) {
   RandomArm random(2);
-  for (int k = 0; k < 6000; ++k) {
+  for (int k = 0; k < 3000; ++k) {
     const int n = 1 + k % 6;
     const ArmParameters arm = random.arm(n, GetParam(), k % 4 == 0 ? 100.0 : 3.0);
     PolarState s{Eigen::VectorXd(2 * n), random.vector(2 * n, 3.0)};
