@@ -42,6 +42,7 @@ Experiment example_experiment() {
   example.plant.arm = example.arm;
   example.plant.actuation = example.actuation;
   example.plant.initial_u_rad.setZero(4);
+  example.plant.loads.resize(1);
   const std::vector<WayPoint> points = {
       {0.0, {0.0, 0.0, 0.0, 0.0}}, {2.0, {0.3, 0.0, 0.5, 0.0}}, {4.0, {0.0, 0.0, 0.0, 0.0}}};
   TipPathReference tip;

@@ -38,10 +38,80 @@ void describe_mocap(SchemaVisitor& visitor, MocapSettings& mocap) {
       {"orientation_noise_rad", "rad",
        "standard deviation of the rotation vector an axis of every body", from_to(0.0, 1.0)},
       mocap.orientation_noise_rad);
+  visitor.number({"position_resolution_m", "m", "positions are rounded to its multiples; 0: exact",
+                  from_to(0.0, 1.0)},
+                 mocap.position_resolution_m);
   visitor.number({"dropout_probability", "", "of a whole frame, independent from frame to frame",
                   from_to(0.0, 1.0)},
                  mocap.dropout_probability);
   visitor.flag({"noise_on_base", "", "the base is measured with noise too"}, mocap.noise_on_base);
+}
+
+void vector3(SchemaVisitor& visitor, const Field& field, Eigen::Vector3d& value) {
+  std::vector<double> values(value.data(), value.data() + 3);
+  visitor.numbers(field, {Shape::Kind::list, 3}, values);
+  value = Eigen::Map<const Eigen::Vector3d>(values.data());
+}
+
+void describe_valves(SchemaVisitor& visitor, ValveSettings& valves) {
+  visitor.number(
+      {"lag_s", "s", "time constant; 0: the command is the pressure", from_to(0.0, 10.0)},
+      valves.lag_s);
+  visitor.number({"supply_pressure_bar", "bar",
+                  "no pressure above it; left out: actuation.max_pressure_bar", above_to(0.0, 1e4)},
+                 valves.supply_pressure_bar);
+  visitor.number({"dead_time_s", "s", "from a command's arrival until the valves begin to act",
+                  from_to(0.0, 10.0)},
+                 valves.dead_time_s);
+  visitor.number({"slew_bar_per_s", "bar/s", "largest rate of a real pressure; 0: no limit",
+                  from_to(0.0, 1e9)},
+                 valves.slew_bar_per_s);
+  visitor.number({"resolution_bar", "bar", "set points are rounded to its multiples; 0: exact",
+                  from_to(0.0, 100.0)},
+                 valves.resolution_bar);
+}
+
+void describe_load(SchemaVisitor& visitor, ExternalLoad& load, int segments) {
+  static const std::array<const char*, 2> kShapes = {"constant", "half_sine"};
+  visitor.integer({"segment", "", "on whose end it acts; 0: the tip",
+                   from_to(0, static_cast<double>(segments))},
+                  load.segment);
+  vector3(visitor, {"force_n", "N", "world frame", from_to(-1e6, 1e6)}, load.force_n);
+  vector3(visitor, {"moment_nm", "N m", "world frame", from_to(-1e6, 1e6)}, load.moment_nm);
+  visitor.choice({"shape", "", "constant, or a blow: half a sine over the duration"}, kShapes,
+                 load.shape);
+  visitor.number({"start_s", "s", "when it begins", from_to(0.0, kMany)}, load.start_s);
+  visitor.number({"duration_s", "s", "0: for ever", from_to(0.0, kMany)}, load.duration_s);
+}
+
+/// What the world does to the arm.
+void describe_world(SchemaVisitor& visitor, PlantSettings& plant) {
+  const int n = plant.arm.size();
+  vector3(
+      visitor,
+      {"tip_force_n", "N", "constant external force at the tip, world frame", from_to(-1e4, 1e4)},
+      plant.tip_force_n);
+  if (visitor.reading() || !plant.loads.empty()) {
+    visitor.list(
+        {"loads", "", "external forces and moments on the segments' ends; none if left out"},
+        static_cast<int>(plant.loads.size()),
+        [&](int size) { plant.loads.resize(static_cast<std::size_t>(size)); },
+        [&](int i) { describe_load(visitor, plant.loads[static_cast<std::size_t>(i)], n); });
+  }
+  plant.payload_kg.resize(static_cast<std::size_t>(n), 0.0);
+  visitor.numbers({"payload_kg", "kg", "point masses on the segments' ends, of all or a list",
+                   from_to(0.0, 100.0)},
+                  {Shape::Kind::scalar_or_list, n}, plant.payload_kg);
+  visitor.section(
+      {"base_motion", "", "the base is carried to and fro, without turning"}, SectionKind::plain,
+      [&] {
+        BaseMotion& motion = plant.base_motion;
+        vector3(visitor, {"amplitude_m", "m", "world frame", from_to(-10.0, 10.0)},
+                motion.amplitude_m);
+        visitor.number({"frequency_hz", "Hz", "of the sine", from_to(0.0, 1000.0)},
+                       motion.frequency_hz);
+        visitor.number({"phase_rad", "rad", "at t = 0", from_to(-100.0, 100.0)}, motion.phase_rad);
+      });
 }
 
 void describe_kind(SchemaVisitor& visitor, PlantSettings& plant) {
@@ -129,15 +199,7 @@ void describe_plant(SchemaVisitor& visitor, Experiment& experiment) {
                   SectionKind::defaults_elsewhere,
                   [&] { describe_actuation(visitor, plant.actuation, n); });
   visitor.section({"valves", "", "between commanded and real pressure (or torque, then in N m)"},
-                  SectionKind::plain, [&] {
-                    visitor.number({"lag_s", "s", "time constant; 0: the command is the pressure",
-                                    from_to(0.0, 10.0)},
-                                   plant.valves.lag_s);
-                    visitor.number({"supply_pressure_bar", "bar",
-                                    "no pressure above it; left out: actuation.max_pressure_bar",
-                                    above_to(0.0, 100.0)},
-                                   plant.valves.supply_pressure_bar);
-                  });
+                  SectionKind::plain, [&] { describe_valves(visitor, plant.valves); });
   visitor.section({"mocap", "", "simulated motion capture"}, SectionKind::plain,
                   [&] { describe_mocap(visitor, plant.mocap); });
   visitor.section({"initial", "", "where the arm starts, at rest"}, SectionKind::plain, [&] {
@@ -146,20 +208,25 @@ void describe_plant(SchemaVisitor& visitor, Experiment& experiment) {
     describe_pose(visitor, u, n, Presence::optional);
     plant.initial_u_rad = Eigen::Map<const Eigen::VectorXd>(u.data(), 2 * n);
   });
-  std::vector<double> force(plant.tip_force_n.data(), plant.tip_force_n.data() + 3);
-  visitor.numbers(
-      {"tip_force_n", "N", "constant external force at the tip, world frame", from_to(-1e4, 1e4)},
-      {Shape::Kind::list, 3}, force);
-  plant.tip_force_n = Eigen::Map<const Eigen::Vector3d>(force.data());
+  describe_world(visitor, plant);
   static const std::array<const char*, 3> kMethods = {"sdirk2", "cash4", "sdirk4"};
-  visitor.choice({"integrator", "", "diagonally implicit Runge-Kutta method of SUNDIALS ARKODE"},
+  if (visitor.reading() && plant.kind != PlantKind::pcc) {
+    // Arms of many light parts answer a step of the torque within microseconds. Error control that
+    // resolves this costs a hundred times more and gains nothing that a motion shows.
+    plant.method = IntegratorMethod::sdirk2;
+    plant.absolute_tolerance = 1e-6;
+  }
+  visitor.choice({"integrator", "",
+                  "diagonally implicit Runge-Kutta method of SUNDIALS ARKODE; left out: cash4, or "
+                  "sdirk2 where kind is not pcc"},
                  kMethods, plant.method);
   visitor.number({"relative_tolerance", "", "of the integrator", from_to(1e-13, 1e-2)},
                  plant.relative_tolerance);
-  visitor.number(
-      {"absolute_tolerance", "rad", "of the integrator, for u; 1000 times that for u' in rad/s",
-       from_to(1e-15, 1e-2)},
-      plant.absolute_tolerance);
+  visitor.number({"absolute_tolerance", "rad",
+                  "of the integrator, for u; 1000 times that for u' in rad/s; left out: 1e-8, or "
+                  "1e-6 where kind is not pcc",
+                  from_to(1e-15, 1e-2)},
+                 plant.absolute_tolerance);
 }
 
 }  // namespace softarm

@@ -1,6 +1,8 @@
 #include "softarm/plant/arm_plant.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <deque>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -37,6 +39,11 @@ const PlantSettings& checked(const PlantSettings& settings) {
          std::to_string(settings.initial_u_rad.size()));
   expect(settings.initial_u_rad.allFinite(), "finite numbers in initial_u", "others");
   expect(settings.tip_force_n.allFinite(), "a finite tip force", "another");
+  expect(settings.payload_kg.empty() || static_cast<int>(settings.payload_kg.size()) == n,
+         std::to_string(n) + " payloads", std::to_string(settings.payload_kg.size()));
+  for (const double payload : settings.payload_kg) {
+    expect(std::isfinite(payload) && payload >= 0.0, "payloads >= 0 kg", std::to_string(payload));
+  }
   expect(settings.arm.gravity_mps2.allFinite(), "finite gravity", "another");
   for (const SegmentParameters& segment : settings.arm.segments) {
     expect(std::isfinite(segment.length_m) && segment.length_m > 0.0, "lengths > 0 m",
@@ -99,6 +106,7 @@ struct ArmPlant::Implementation {
   explicit Implementation(const PlantSettings& settings)
       : arm(checked(settings).arm),
         lag_s(settings.valves.lag_s),
+        dead_time_s(settings.valves.dead_time_s),
         valves(settings.valves, count_chambers(settings.actuation),
                settings.actuation.kind == ActuationKind::torque),
         map(chamber_map(settings.actuation)),
@@ -119,18 +127,48 @@ struct ArmPlant::Implementation {
 
   /// Tells the equation of motion what the valves will do from now on.
   void drive() {
+    if (valves.slewed()) {
+      system->input().follow(integrator.time_s(), valves, map);
+      return;
+    }
     present_nm.noalias() = map * valves.pressures_bar();
     target_nm.noalias() = map * valves.commanded_bar();
     system->drive(integrator.time_s(), present_nm, target_nm, lag_s);
   }
 
+  /// Lets happen what is due: commands after their dead time, loads that begin or end.
+  void meet_events() {
+    const double now = integrator.time_s();
+    while (!pending.empty() && pending.front().due_s <= now) {
+      valves.command(pending.front().command_bar);
+      pending.pop_front();
+    }
+    system->surroundings().enter(now);
+  }
+
+  Eigen::Vector3d displacement_m() const {
+    return system->surroundings().base_displacement_m(integrator.time_s());
+  }
+
+  double next_event_s() const {
+    const double load_s = system->surroundings().until(integrator.time_s());
+    return pending.empty() ? load_s : std::min(load_s, pending.front().due_s);
+  }
+
+  struct PendingCommand {
+    double due_s;
+    std::vector<double> command_bar;
+  };
+
   ArmParameters arm;
   double lag_s;
+  double dead_time_s;
   Valves valves;
   Eigen::MatrixXd map;
   std::unique_ptr<PlantSystem> system;
   ArkodeIntegrator integrator;
   Eigen::VectorXd present_nm, target_nm;
+  std::deque<PendingCommand> pending;
   mutable std::vector<Eigen::Isometry3d> ends;
 };
 
@@ -144,20 +182,27 @@ int ArmPlant::dof() const noexcept { return implementation_->system->size(); }
 int ArmPlant::segments() const noexcept { return implementation_->arm.size(); }
 int ArmPlant::chambers() const noexcept { return implementation_->valves.size(); }
 
-void ArmPlant::command(std::span<const double> command_bar) noexcept {
-  implementation_->valves.command(command_bar);
-  implementation_->drive();
+void ArmPlant::command(std::span<const double> command_bar) {
+  Implementation& self = *implementation_;
+  if (self.dead_time_s > 0.0) {
+    self.pending.push_back(
+        {self.integrator.time_s() + self.dead_time_s, {command_bar.begin(), command_bar.end()}});
+    return;
+  }
+  self.valves.command(command_bar);
+  self.drive();
 }
 
 void ArmPlant::advance(double t_end_s) {
   Implementation& self = *implementation_;
-  const double step_s = t_end_s - self.integrator.time_s();
-  if (!(step_s > 0.0)) {
-    return;
+  while (t_end_s > self.integrator.time_s()) {
+    const double from_s = self.integrator.time_s();
+    const double to_s = std::min(t_end_s, self.next_event_s());
+    self.integrator.advance(to_s);
+    self.valves.advance(to_s - from_s);
+    self.meet_events();
+    self.drive();
   }
-  self.integrator.advance(t_end_s);
-  self.valves.advance(step_s);
-  self.drive();
 }
 
 void ArmPlant::advance(double t_end_s, std::span<const double> command_bar) {
@@ -175,6 +220,7 @@ void ArmPlant::reset(ConstVectorRef u_rad, ConstVectorRef velocity_radps,
   expect(static_cast<int>(pressure_bar.size()) == chambers(),
          std::to_string(chambers()) + " pressures", std::to_string(pressure_bar.size()));
   expect(u_rad.allFinite() && velocity_radps.allFinite(), "a finite state", "another");
+  self.pending.clear();
   self.valves.reset(pressure_bar);
   self.drive();
   Eigen::VectorXd x(self.system->size());
@@ -219,12 +265,16 @@ const Eigen::VectorXd& ArmPlant::commanded_bar() const noexcept {
 Eigen::Isometry3d ArmPlant::base() const noexcept {
   Eigen::Isometry3d base = Eigen::Isometry3d::Identity();
   base.linear() = implementation_->arm.base_rotation;
-  base.translation() = implementation_->arm.base_position_m;
+  base.translation() = implementation_->arm.base_position_m + implementation_->displacement_m();
   return base;
 }
 
 void ArmPlant::segment_ends(std::span<Eigen::Isometry3d> segment_ends) const noexcept {
   implementation_->system->segment_ends(implementation_->integrator.x(), segment_ends);
+  if (implementation_->system->surroundings().base_moves()) {
+    const Eigen::Vector3d displacement = implementation_->displacement_m();
+    for (Eigen::Isometry3d& end : segment_ends) end.translation() += displacement;
+  }
 }
 
 Eigen::Vector3d ArmPlant::tip_m() const noexcept {

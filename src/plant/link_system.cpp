@@ -34,12 +34,10 @@ inline LinkSystem::Vec3 LinkSystem::out_of(const Turn& t, const Vec3& v) {
 }
 
 LinkSystem::LinkSystem(const PlantSettings& settings)
-    : per_segment_(settings.links.links_per_segment),
+    : PlantSystem(settings.arm.size(), settings),
+      per_segment_(settings.links.links_per_segment),
       arm_(settings.arm),
-      gravity_(arm_.base_rotation.transpose() * arm_.gravity_mps2),
-      tip_force_n_(arm_.base_rotation.transpose() * settings.tip_force_n),
-      has_tip_force_(settings.tip_force_n != Vec3::Zero()),
-      input_(arm_.dof()) {
+      gravity_(arm_.base_rotation.transpose() * arm_.gravity_mps2) {
   if (per_segment_ < 1 || per_segment_ > kMaxLinksPerSegment) {
     throw std::invalid_argument("plant.links.links_per_segment: expected 1 to " +
                                 std::to_string(kMaxLinksPerSegment) + ", got " +
@@ -54,6 +52,7 @@ LinkSystem::LinkSystem(const PlantSettings& settings)
         .length_m = length,
         .mass_kg = mass,
         .inertia_kgm2 = rod ? mass * length * length / 12.0 : 0.0,
+        .payload_kg = 0.0,
         .stiffness_nm_per_rad =
             settings.links.joint_stiffness_nm_per_rad.value_or(m * segment.stiffness_nm_per_rad),
         .damping_nms_per_rad =
@@ -61,6 +60,9 @@ LinkSystem::LinkSystem(const PlantSettings& settings)
     expect_not_negative(link.stiffness_nm_per_rad, "joint_stiffness_nm_per_rad");
     expect_not_negative(link.damping_nms_per_rad, "joint_damping_nms_per_rad");
     links_.insert(links_.end(), static_cast<std::size_t>(per_segment_), link);
+  }
+  for (std::size_t i = 0; i < settings.payload_kg.size(); ++i) {
+    links_[last_link(static_cast<int>(i))].payload_kg = settings.payload_kg[i];
   }
   const Eigen::Index n = size();
   turns_.resize(links_.size());
@@ -85,10 +87,9 @@ LinkSystem::LinkSystem(const PlantSettings& settings)
 // upward acceleration of the base.
 void LinkSystem::residual(double t_s, ConstVector x, ConstVector v, ConstVector a, Vector out) {
   const std::size_t count = links_.size();
-  Vec3 spin = Vec3::Zero();       // angular velocity
-  Vec3 spin_rate = Vec3::Zero();  // and its derivative
-  Vec3 start = -gravity_;         // acceleration of the link's start
-  Vec3 tip_force = tip_force_n_;
+  Vec3 spin = Vec3::Zero();                        // angular velocity
+  Vec3 spin_rate = Vec3::Zero();                   // and its derivative
+  Vec3 start = base_acceleration(t_s) - gravity_;  // acceleration of the link's start
   for (std::size_t j = 0; j < count; ++j) {
     const auto k = static_cast<Eigen::Index>(2 * j);
     const Turn t = turns_[j] = turn(x[k], x[k + 1]);
@@ -111,9 +112,14 @@ void LinkSystem::residual(double t_s, ConstVector x, ConstVector v, ConstVector 
     moment_[j] = Vec3(inertia * (spin_rate.x() - spin.z() * spin.y()) - half * force.y(),
                       inertia * (spin_rate.y() + spin.z() * spin.x()) + half * force.x(), 0.0);
     start += link.length_m * along;
-    if (has_tip_force_) tip_force = into(t, tip_force);
+    if (link.payload_kg > 0.0) {
+      const Vec3 hung = link.payload_kg * start;
+      force_[j] += hung;
+      moment_[j] += link.length_m * Vec3(-hung.y(), hung.x(), 0.0);
+    }
   }
-  Vec3 force = has_tip_force_ ? Vec3(-tip_force) : Vec3(Vec3::Zero());
+  if (surroundings_.any_load_on()) subtract_loads(t_s);
+  Vec3 force = Vec3::Zero();
   Vec3 moment = Vec3::Zero();  // both that the link passes on, at its end
   for (std::size_t j = count; j-- > 0;) {
     const auto k = static_cast<Eigen::Index>(2 * j);
@@ -140,6 +146,27 @@ void LinkSystem::residual(double t_s, ConstVector x, ConstVector v, ConstVector 
         out.segment<2>(2 * j) -= tau;
       }
     }
+  }
+}
+
+LinkSystem::Vec3 LinkSystem::base_acceleration(double t_s) const {
+  if (!surroundings_.base_moves()) return Vec3::Zero();
+  return arm_.base_rotation.transpose() * surroundings_.base_acceleration_mps2(t_s);
+}
+
+void LinkSystem::subtract_loads(double t_s) {
+  for (const Surroundings::Load& load : surroundings_.loads()) {
+    if (!load.on) continue;
+    const double scale = Surroundings::scale(load, t_s);
+    Vec3 force = scale * (arm_.base_rotation.transpose() * load.force_n);
+    Vec3 moment = scale * (arm_.base_rotation.transpose() * load.moment_nm);
+    const std::size_t end = last_link(load.segment);
+    for (std::size_t j = 0; j <= end; ++j) {
+      force = into(turns_[j], force);
+      moment = into(turns_[j], moment);
+    }
+    force_[end] -= force;
+    moment_[end] -= moment + links_[end].length_m * Vec3(-force.y(), force.x(), 0.0);
   }
 }
 
@@ -177,6 +204,13 @@ void LinkSystem::inertia(Matrix B) {
     const Vec3 centre = origin_[j] + 0.5 * link.length_m * along;
     mass += link.mass_kg;
     first += link.mass_kg * centre;
+    if (link.payload_kg > 0.0) {
+      const Vec3 end = origin_[j] + link.length_m * along;
+      mass += link.payload_kg;
+      first += link.payload_kg * end;
+      second += link.payload_kg *
+                (end.squaredNorm() * Eigen::Matrix3d::Identity() - end * end.transpose());
+    }
     second +=
         (link.mass_kg * centre.squaredNorm() + link.inertia_kgm2) * Eigen::Matrix3d::Identity() -
         link.mass_kg * centre * centre.transpose() - link.inertia_kgm2 * along * along.transpose();
@@ -208,15 +242,16 @@ bool LinkSystem::acceleration(double t_s, ConstVector x, ConstVector v, Vector a
   return a.allFinite();
 }
 
-void LinkSystem::linearize(double, ConstVector x, ConstVector, ConstVector, Matrix by_a,
+void LinkSystem::linearize(double t_s, ConstVector x, ConstVector, ConstVector, Matrix by_a,
                            Matrix by_v, Matrix by_x) {
   place(x);
   inertia(by_a);
   by_v.setZero();
   by_v.diagonal() = damping_;
+  const Vec3 gravity = gravity_ - base_acceleration(t_s);
   for (Eigen::Index angle = 0; angle < size(); ++angle) {
     const Vec3 axis = motion_.col(angle).head<3>();
-    swing_.col(angle) = axis.cross(gravity_);
+    swing_.col(angle) = axis.cross(gravity);
   }
   // Turning angle a turns what angle b carries, and b's axis with it, against gravity.
   by_x.triangularView<Eigen::Upper>() = swing_.transpose() * lever_;
@@ -237,17 +272,26 @@ void LinkSystem::add_input(double t_s, ConstVector x, Vector out) {
                         : tau[angle % 2];
     }
   }
-  if (has_tip_force_) {
-    const Vec3 tip = origin_.back() + links_.back().length_m * rotation_.back().col(2);
+  for (const Surroundings::Load& load : surroundings_.loads()) {
+    if (!load.on) continue;
+    const double scale = Surroundings::scale(load, t_s);
+    const std::size_t last = last_link(load.segment);
+    const Vec3 end = origin_[last] + links_[last].length_m * rotation_[last].col(2);
+    const Vec3 force = scale * (arm_.base_rotation.transpose() * load.force_n);
     Eigen::Matrix<double, 6, 1> wrench;
-    wrench << tip.cross(tip_force_n_), tip_force_n_;
-    out.noalias() += motion_.transpose() * wrench;
+    wrench << end.cross(force) + scale * (arm_.base_rotation.transpose() * load.moment_nm), force;
+    const auto moved = static_cast<Eigen::Index>(2 * (last + 1));
+    out.head(moved).noalias() += motion_.leftCols(moved).transpose() * wrench;
   }
 }
 
 SecondOrderSystem::Powers LinkSystem::powers(double t_s, ConstVector x, ConstVector v) {
   scratch_.setZero();
   add_input(t_s, x, scratch_);
+  if (surroundings_.base_moves()) {
+    inertia(inertia_);  // for the first moments that the angles carry
+    scratch_.noalias() -= lever_.transpose() * base_acceleration(t_s);
+  }
   return {.supplied_w = scratch_.dot(v), .dissipated_w = v.dot(damping_.cwiseProduct(v))};
 }
 
@@ -265,6 +309,7 @@ double LinkSystem::kinetic_energy_j(ConstVector x, ConstVector v) {
     energy += 0.5 * link.mass_kg * (start + 0.5 * link.length_m * along).squaredNorm() +
               0.5 * link.inertia_kgm2 * along.squaredNorm();
     start += link.length_m * along;
+    energy += 0.5 * link.payload_kg * start.squaredNorm();
   }
   return energy;
 }
@@ -273,9 +318,11 @@ double LinkSystem::potential_energy_j(ConstVector x) {
   place(x);
   double energy = 0.5 * x.dot(stiffness_.cwiseProduct(x));
   for (std::size_t j = 0; j < links_.size(); ++j) {
-    const Vec3 centre = origin_[j] + 0.5 * links_[j].length_m * rotation_[j].col(2);
-    energy -=
-        links_[j].mass_kg * (gravity_.dot(centre) + arm_.gravity_mps2.dot(arm_.base_position_m));
+    const Link& link = links_[j];
+    const Vec3 along = link.length_m * rotation_[j].col(2);
+    energy -= gravity_.dot((link.mass_kg + link.payload_kg) * origin_[j] +
+                           (0.5 * link.mass_kg + link.payload_kg) * along) +
+              (link.mass_kg + link.payload_kg) * arm_.gravity_mps2.dot(arm_.base_position_m);
   }
   return energy;
 }

@@ -5,7 +5,6 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "plant/actuator_input.hpp"
 #include "plant/plant_system.hpp"
 #include "softarm/plant/settings.hpp"
 
@@ -24,10 +23,6 @@ class LinkSystem final : public PlantSystem {
  public:
   /// @throw std::invalid_argument for a number of links, a stiffness or a damping that cannot be.
   explicit LinkSystem(const PlantSettings& settings);
-
-  void drive(double t_s, ConstVector present_nm, ConstVector target_nm, double lag_s) override {
-    input_.drive(t_s, present_nm, target_nm, lag_s);
-  }
 
   int size() const override { return 2 * static_cast<int>(links_.size()); }
   void residual(double t_s, ConstVector x, ConstVector v, ConstVector a, Vector out) override;
@@ -49,6 +44,7 @@ class LinkSystem final : public PlantSystem {
     double length_m;
     double mass_kg;
     double inertia_kgm2;  // about either axis across the link, through its centre
+    double payload_kg;    // at its end
     double stiffness_nm_per_rad, damping_nms_per_rad;
   };
   /// Sine and cosine of a joint's angles.
@@ -62,6 +58,13 @@ class LinkSystem final : public PlantSystem {
   static Vec3 out_of(const Turn& turn, const Vec3& v);  // and back
 
   void place(ConstVector x);
+  /// Acceleration of the base in its own axes.
+  Vec3 base_acceleration(double t_s) const;
+  /// Takes the loads that are on from what moves the links, whose turns are known.
+  void subtract_loads(double t_s);
+  std::size_t last_link(int segment) const {
+    return static_cast<std::size_t>((segment + 1) * per_segment_ - 1);
+  }
   /// out += actuation and external forces, all generalized.
   void add_input(double t_s, ConstVector x, Vector out);
   void inertia(Matrix B);
@@ -70,10 +73,7 @@ class LinkSystem final : public PlantSystem {
   ArmParameters arm_;
   std::vector<Link> links_;
   Eigen::VectorXd stiffness_, damping_;  // diagonals of K and D
-  Vec3 gravity_;                         // in the base frame
-  Vec3 tip_force_n_;                     // in the base frame
-  bool has_tip_force_;
-  ActuatorInput input_;
+  Vec3 gravity_;                         // in the base frame, without the base's acceleration
 
   // Of one evaluation, from base to tip and back.
   std::vector<Turn> turns_;

@@ -74,6 +74,12 @@ BodyPose MocapSimulator::sense(const Eigen::Isometry3d& pose, bool noisy) noexce
     body.orientation =
         body.orientation * Eigen::Quaterniond(std::cos(half), xyz.x(), xyz.y(), xyz.z());
   }
+  if (settings_.position_resolution_m > 0.0) {
+    for (int axis = 0; axis < 3; ++axis) {
+      const double step = settings_.position_resolution_m;
+      body.position_m[axis] = step * std::round(body.position_m[axis] / step);
+    }
+  }
   body.orientation.normalize();
   return body;
 }

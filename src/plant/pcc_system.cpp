@@ -9,20 +9,21 @@
 namespace softarm {
 
 PccSystem::PccSystem(const PlantSettings& settings)
-    : segments_(settings.arm.size()),
+    : PlantSystem(settings.arm.size(), settings),
+      segments_(settings.arm.size()),
       pieces_(settings.kind == PlantKind::refined ? settings.refined.pieces : 1),
       arm_(pieces_of(settings)),
       share_(arm_.size()),
-      tip_force_n_(settings.tip_force_n),
-      has_tip_force_(settings.tip_force_n != Eigen::Vector3d::Zero()),
+      gravity_mps2_(arm_.gravity_mps2),
+      loads_(arm_, pieces_, settings.payload_kg),
       workspace_(arm_),
-      input_(settings.arm.dof()),
       piece_ends_(static_cast<std::size_t>(arm_.size())) {
   const Eigen::Index n = arm_.dof();
   for (Eigen::VectorXd* vector : {&stiffness_, &damping_, &shifted_, &above_, &below_, &sum_}) {
     vector->setZero(n);
   }
   coriolis_.setZero(n, n);
+  inertia_.setZero(n, n);
   for (int j = 0; j < arm_.size(); ++j) {
     const SegmentParameters& piece = arm_.segments[static_cast<std::size_t>(j)];
     const SegmentParameters& whole = settings.arm.segments[static_cast<std::size_t>(j / pieces_)];
@@ -46,6 +47,12 @@ void PccSystem::add_couple(const Eigen::Vector2d& tau_nm, int first_piece, Const
   }
 }
 
+void PccSystem::feel_base(double t_s) {
+  if (surroundings_.base_moves()) {
+    arm_.gravity_mps2 = gravity_mps2_ - surroundings_.base_acceleration_mps2(t_s);
+  }
+}
+
 void PccSystem::add_input(double t_s, ConstVector u, Vector out) {
   const bool couple = arm_.actuation == ActuationModel::couple;
   const Eigen::VectorXd& force = input_.force_nm(t_s);
@@ -62,8 +69,8 @@ void PccSystem::add_input(double t_s, ConstVector u, Vector out) {
       add_couple(input_.tau_nm(t_s, i), first, u, out);
     }
   }
-  if (has_tip_force_) {
-    add_tip_force(arm_, u, tip_force_n_, out);
+  if (surroundings_.any_load_on()) {
+    loads_.add_external(surroundings_, t_s, u, out);
   }
 }
 
@@ -71,19 +78,35 @@ void PccSystem::residual(double t_s, ConstVector u, ConstVector velocity, ConstV
                          Vector out) {
   sum_.setZero();
   add_input(t_s, u, sum_);
+  feel_base(t_s);
   inverse_dynamics(arm_, workspace_, u, velocity, velocity, acceleration, {}, out);
+  if (loads_.has_payload()) {
+    loads_.add_payload(u, velocity, acceleration, arm_.gravity_mps2, out);
+  }
   out += stiffness_.cwiseProduct(u) + damping_.cwiseProduct(velocity) - sum_;
 }
 
 bool PccSystem::acceleration(double t_s, ConstVector u, ConstVector velocity, Vector out) {
+  if (loads_.has_payload()) {
+    above_.setZero();
+    residual(t_s, u, velocity, above_, below_);
+    below_ = -below_;
+    inertia_matrix(arm_, workspace_, u, inertia_);
+    loads_.add_payload(u, velocity, inertia_, coriolis_);
+    return solve_inertia(workspace_, inertia_, below_, out);
+  }
   sum_.setZero();
   add_input(t_s, u, sum_);
+  feel_base(t_s);
   return forward_dynamics(arm_, workspace_, u, velocity, sum_, out);
 }
 
 void PccSystem::linearize(double t_s, ConstVector u, ConstVector velocity, ConstVector acceleration,
                           Matrix by_acceleration, Matrix by_velocity, Matrix by_u) {
   dynamics_matrices(arm_, workspace_, u, velocity, by_acceleration, coriolis_, above_);
+  if (loads_.has_payload()) {
+    loads_.add_payload(u, velocity, by_acceleration, coriolis_);
+  }
   by_velocity = 2.0 * coriolis_;  // C(u, a) b is symmetric in a and b
   by_velocity.diagonal() += damping_;
   // Central differences: step^2 and round-off / step balance near the cube root of the round-off.
@@ -102,16 +125,27 @@ void PccSystem::linearize(double t_s, ConstVector u, ConstVector velocity, Const
 SecondOrderSystem::Powers PccSystem::powers(double t_s, ConstVector u, ConstVector velocity) {
   sum_.setZero();
   add_input(t_s, u, sum_);
+  if (surroundings_.base_moves()) {
+    // Inertia forces of the base's acceleration, the only weight in this.
+    arm_.gravity_mps2 = -surroundings_.base_acceleration_mps2(t_s);
+    above_.setZero();
+    const DynamicsTerms weight = {.inertia = false, .coriolis = false, .gravity = true};
+    inverse_dynamics(arm_, workspace_, u, above_, above_, above_, weight, below_);
+    if (loads_.has_payload()) loads_.add_payload(u, above_, above_, arm_.gravity_mps2, below_);
+    sum_ -= below_;
+  }
   return {.supplied_w = sum_.dot(velocity),
           .dissipated_w = velocity.dot(damping_.cwiseProduct(velocity))};
 }
 
 double PccSystem::kinetic_energy_j(ConstVector u, ConstVector velocity) {
-  return kinetic_energy(arm_, workspace_, u, velocity);
+  return kinetic_energy(arm_, workspace_, u, velocity) + loads_.kinetic_energy_j(u, velocity);
 }
 
 double PccSystem::potential_energy_j(ConstVector u) {
-  return gravity_potential(arm_, u) + 0.5 * u.dot(stiffness_.cwiseProduct(u));
+  arm_.gravity_mps2 = gravity_mps2_;
+  return gravity_potential(arm_, u) + loads_.potential_energy_j(u) +
+         0.5 * u.dot(stiffness_.cwiseProduct(u));
 }
 
 void PccSystem::spread(ConstVector u, Vector x) const {

@@ -1,10 +1,10 @@
-// The piecewise constant curvature arm as a second-order system: (16) with a tip force, behind
-// valves; one piece a segment or several.
+// The piecewise constant curvature arm as a second-order system: (16) with what the world does to
+// it, behind valves; one piece a segment or several.
 #pragma once
 
 #include <Eigen/Core>
 
-#include "plant/actuator_input.hpp"
+#include "plant/pcc_loads.hpp"
 #include "plant/plant_system.hpp"
 #include "softarm/model/dynamics.hpp"
 #include "softarm/plant/settings.hpp"
@@ -19,10 +19,6 @@ class PccSystem final : public PlantSystem {
  public:
   /// @throw std::invalid_argument for pieces that cannot be.
   explicit PccSystem(const PlantSettings& settings);
-
-  void drive(double t_s, ConstVector present_nm, ConstVector target_nm, double lag_s) override {
-    input_.drive(t_s, present_nm, target_nm, lag_s);
-  }
 
   int size() const override { return arm_.dof(); }
   void residual(double t_s, ConstVector u, ConstVector velocity, ConstVector acceleration,
@@ -39,21 +35,22 @@ class PccSystem final : public PlantSystem {
   void curvature(ConstVector x, ConstVector v, Vector u, Vector rate) const override;
 
  private:
+  /// A base that accelerates is gravity the other way.
+  void feel_base(double t_s);
   /// out += A tau_A(t) + J' f_ext.
   void add_input(double t_s, ConstVector u, Vector out);
   void add_couple(const Eigen::Vector2d& tau_nm, int first_piece, ConstVector u, Vector out) const;
 
   int segments_;
-  int pieces_;             // a segment
-  ArmParameters arm_;      // of pieces
-  Eigen::VectorXd share_;  // of a segment's bend under a uniform moment, one a piece
-  Eigen::Vector3d tip_force_n_;
-  bool has_tip_force_;
+  int pieces_;                    // a segment
+  ArmParameters arm_;             // of pieces
+  Eigen::VectorXd share_;         // of a segment's bend under a uniform moment, one a piece
+  Eigen::Vector3d gravity_mps2_;  // without the base's acceleration
+  PccLoads loads_;
   DynamicsWorkspace workspace_;
-  ActuatorInput input_;
   Eigen::VectorXd stiffness_, damping_;            // diagonals of K and D
   Eigen::VectorXd shifted_, above_, below_, sum_;  // scratch
-  Eigen::MatrixXd coriolis_;
+  Eigen::MatrixXd coriolis_, inertia_;
   mutable std::vector<Eigen::Isometry3d> piece_ends_;
 };
 

@@ -7,7 +7,9 @@
 #include <memory>
 #include <span>
 
+#include "plant/actuator_input.hpp"
 #include "plant/second_order_system.hpp"
+#include "plant/surroundings.hpp"
 #include "softarm/plant/settings.hpp"
 
 namespace softarm {
@@ -15,9 +17,17 @@ namespace softarm {
 /// A second-order system driven by n actuated segments. Coordinates x are the kind's own.
 class PlantSystem : public SecondOrderSystem {
  public:
+  PlantSystem(int segments, const PlantSettings& settings)
+      : input_(2 * segments), surroundings_(settings) {}
+
   /// From t_s on the actuators make the generalized force (A_chamber tau_A of every segment, 2n,
   /// N m) target + (present - target) exp(-(t - t_s) / lag_s); lag 0: target.
-  virtual void drive(double t_s, ConstVector present_nm, ConstVector target_nm, double lag_s) = 0;
+  void drive(double t_s, ConstVector present_nm, ConstVector target_nm, double lag_s) {
+    input_.drive(t_s, present_nm, target_nm, lag_s);
+  }
+  ActuatorInput& input() { return input_; }
+  Surroundings& surroundings() { return surroundings_; }
+  const Surroundings& surroundings() const { return surroundings_; }
 
   virtual double kinetic_energy_j(ConstVector x, ConstVector v) = 0;
   /// Of gravity (zero at the world's origin) and bending.
@@ -31,6 +41,10 @@ class PlantSystem : public SecondOrderSystem {
 
   /// u and u' (2n) of the PCC arm whose segments' ends are turned as this arm's are.
   virtual void curvature(ConstVector x, ConstVector v, Vector u, Vector rate) const = 0;
+
+ protected:
+  ActuatorInput input_;
+  Surroundings surroundings_;
 };
 
 /// @throw std::invalid_argument where `settings` ask for parts that cannot be.

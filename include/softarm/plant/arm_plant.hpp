@@ -14,12 +14,13 @@
 
 namespace softarm {
 
-/// Energies in J. For any time, kinetic + potential - (their sum at the start) = supplied -
+/// Energies in J, as seen from the base if that moves: the forces of its acceleration then count
+/// as external ones. For any time, kinetic + potential - (their sum at the start) = supplied -
 /// dissipated.
 struct PlantEnergies {
   double kinetic = 0.0;
-  double potential = 0.0;  ///< of gravity, zero at the world's origin, and of bending
-  double supplied = 0.0;   ///< by chambers and tip force since the start; 0 unless `account_energy`
+  double potential = 0.0;   ///< of gravity, zero at the world's origin, and of bending
+  double supplied = 0.0;    ///< by chambers and loads since the start; 0 unless `account_energy`
   double dissipated = 0.0;  ///< by damping since the start; 0 unless `account_energy`
 };
 
@@ -43,12 +44,15 @@ class ArmPlant {
   int chambers() const noexcept;  ///< of all segments together
 
   /// Sets what the valves are commanded from now on. @param command_bar `chambers()` pressures
-  /// above ambient, segment by segment; bounded to the supply.
-  void command(std::span<const double> command_bar) noexcept;
+  /// above ambient, segment by segment; bounded to the supply. They come into force after the dead
+  /// time, if any.
+  void command(std::span<const double> command_bar);
 
-  /// Integrates up to `t_end_s` with the command held; nothing happens if that is not ahead.
+  /// Integrates up to `t_end_s` with the command held; nothing happens if that is not ahead. Stops
+  /// on its way where a command comes into force after its dead time, or an external load begins or
+  /// ends.
   /// @throw PlantError if the tolerance cannot be met; the plant is then where it was before the
-  /// call.
+  /// call, or at the last of these stops.
   void advance(double t_end_s);
 
   /// Both of the above.

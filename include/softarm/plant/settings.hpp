@@ -16,6 +16,9 @@ namespace softarm {
 struct ValveSettings {
   double lag_s = 0.0;                ///< time constant
   double supply_pressure_bar = 2.0;  ///< no pressure above it
+  double dead_time_s = 0.0;     ///< from the arrival of a command until the valves begin to act
+  double slew_bar_per_s = 0.0;  ///< largest rate of a real pressure; 0: as fast as the lag lets it
+  double resolution_bar = 0.0;  ///< of the set points: rounded to whole multiples; 0: exact
 };
 
 /// Simulated motion capture.
@@ -25,8 +28,9 @@ struct MocapSettings {
   double position_noise_m = 0.0;  ///< standard deviation an axis of every body
   double orientation_noise_rad =
       0.0;  ///< standard deviation of the rotation vector an axis of every body
-  double dropout_probability = 0.0;  ///< of a whole frame, independent from frame to frame
-  bool noise_on_base = true;         ///< the base is a measured body too, unless it is fixed
+  double position_resolution_m = 0.0;  ///< positions are rounded to whole multiples; 0: exact
+  double dropout_probability = 0.0;    ///< of a whole frame, independent from frame to frame
+  bool noise_on_base = true;           ///< the base is a measured body too, unless it is fixed
 };
 
 /// What the simulated arm is made of.
@@ -55,6 +59,30 @@ struct LinkSettings {
   int links_per_segment = 6;
   std::optional<double> joint_stiffness_nm_per_rad;
   std::optional<double> joint_damping_nms_per_rad;
+};
+
+/// How an external load changes in time.
+enum class LoadShape {
+  constant,  ///< switched on and off
+  half_sine  ///< a blow: half a sine wave over the duration
+};
+
+/// A force and a moment on the end of a segment, in world axes.
+struct ExternalLoad {
+  int segment = 0;  ///< 1..n from the base; 0: the tip
+  Eigen::Vector3d force_n = Eigen::Vector3d::Zero();
+  Eigen::Vector3d moment_nm = Eigen::Vector3d::Zero();
+  LoadShape shape = LoadShape::constant;
+  double start_s = 0.0;
+  double duration_s = 0.0;  ///< 0: for ever (a constant load only)
+};
+
+/// A base that is carried to and fro, without turning: base_position + amplitude sin(2 pi frequency
+/// t + phase).
+struct BaseMotion {
+  Eigen::Vector3d amplitude_m = Eigen::Vector3d::Zero();  ///< world axes
+  double frequency_hz = 0.0;
+  double phase_rad = 0.0;
 };
 
 /// Which diagonally implicit Runge-Kutta method of ARKODE integrates (stiffly accurate, no explicit
@@ -90,6 +118,9 @@ struct PlantSettings {
   SegmentVector initial_u_rad;
   Eigen::Vector3d tip_force_n =
       Eigen::Vector3d::Zero();  ///< constant external force at the tip, world frame
+  std::vector<ExternalLoad> loads;
+  std::vector<double> payload_kg;  ///< point masses on the segments' ends; empty: none, else n
+  BaseMotion base_motion;
   IntegratorMethod method = IntegratorMethod::cash4;
   double relative_tolerance = 1e-6;  ///< of the SUNDIALS integrator
   double absolute_tolerance = 1e-8;  ///< of u (rad); kVelocityTolerance times that of u' (rad/s)

@@ -14,7 +14,9 @@ namespace softarm {
 ///
 /// While a command is held the pressure is known in closed form, p(t) = c + (p(0) - c) exp(-t /
 /// lag): stepping is exact for any step, and an integrator may ask for the pressure at any time
-/// ahead. Lag 0 is the ideal valve.
+/// ahead. Lag 0 is the ideal valve. A slew limit, if any, first lets the pressure rise (or fall) on
+/// a straight line until the lag alone is slower; a resolution rounds what is commanded. Dead time
+/// is not theirs: see ArmPlant.
 class Valves {
  public:
   /// @param chambers number of valves, >= 0. All start at 0 bar with 0 bar commanded.
@@ -37,6 +39,12 @@ class Valves {
   /// too.
   void reset(std::span<const double> pressure_bar) noexcept;
 
+  /// What the pressures will be `ahead_s` >= 0 from now if the command is held; `out` has `size()`.
+  void after(double ahead_s, Eigen::Ref<Eigen::VectorXd> out) const noexcept;
+
+  /// Whether a slew limit is in force: then pressures are not exponentials of time.
+  bool slewed() const noexcept { return slew_bar_per_s_ > 0.0; }
+
   /// exp(-ahead / lag): what is left after `ahead_s` of the difference between pressure and command
   /// (0 with lag 0).
   double remaining(double ahead_s) const noexcept;
@@ -50,6 +58,8 @@ class Valves {
   double lag_s_;
   double supply_bar_;
   double lowest_bar_;
+  double slew_bar_per_s_;
+  double resolution_bar_;
   Eigen::VectorXd pressure_bar_;
   Eigen::VectorXd command_bar_;
 };
