@@ -8,6 +8,7 @@
 #include "softarm/config/load.hpp"
 #include "softarm/control/gain_check.hpp"
 #include "softarm/control/reference.hpp"
+#include "softarm/control/task_space_path.hpp"
 #include "softarm/daemon/safety_monitor.hpp"
 #include "softarm/model/actuation_matrix.hpp"
 #include "softarm/model/dynamics.hpp"
@@ -89,6 +90,20 @@ std::vector<std::string> experiment_warnings(const Experiment& experiment) {
       warnings.push_back(fmt::format(
           "reference[{}]: the chambers give only {:.0f} % of the torque that holds its poses", i,
           std::floor(100.0 * scale)));
+    }
+  }
+
+  double length_m = 0.0;
+  for (const SegmentParameters& segment : experiment.arm.segments) length_m += segment.length_m;
+  for (std::size_t i = 0; i < experiment.reference.phases.size(); ++i) {
+    const auto* path = std::get_if<TipPathReference>(&experiment.reference.phases[i].kind);
+    if (path == nullptr) continue;
+    const double away_m = largest_distance_m(*path, experiment.arm.base_position_m);
+    if (away_m > length_m) {
+      warnings.push_back(fmt::format(
+          "reference[{}]: the path goes {:.4g} m away from the base, the arm is {:.4g} m "
+          "long: the tip will stay behind",
+          i, away_m, length_m));
     }
   }
 

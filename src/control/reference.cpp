@@ -9,8 +9,8 @@
 
 #include "control/blend.hpp"
 #include "control/reference_curves.hpp"
-#include "control/task_space_path.hpp"
 #include "control/task_space_tracker.hpp"
+#include "softarm/control/task_space_path.hpp"
 #include "softarm/model/kinematics.hpp"
 
 namespace softarm {

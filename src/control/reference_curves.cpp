@@ -7,7 +7,7 @@
 #include <numbers>
 #include <stdexcept>
 
-#include "control/task_space_path.hpp"
+#include "softarm/control/task_space_path.hpp"
 
 namespace softarm {
 namespace {

@@ -1,6 +1,8 @@
-#include "control/task_space_path.hpp"
+#include "softarm/control/task_space_path.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <stdexcept>
 
 namespace softarm {
@@ -18,6 +20,18 @@ TipReference evaluate(const TipPathReference& path, double time_s) noexcept {
   out.acceleration_mps2 =
       -path.first_axis_m * (first * first * cosine) - path.second_axis_m * (second * second * sine);
   return out;
+}
+
+double largest_distance_m(const TipPathReference& path, const Eigen::Vector3d& from_m) noexcept {
+  constexpr int kInstants = 720;
+  TipPathReference unit = path;
+  unit.rate_radps = 1.0;
+  double largest = 0.0;
+  for (int k = 0; k < kInstants; ++k) {
+    const double angle = 2.0 * std::numbers::pi * k / kInstants;
+    largest = std::max(largest, (evaluate(unit, angle).position_m - from_m).norm());
+  }
+  return largest;
 }
 
 void check_tip_path(const std::string& where, const TipPathReference& path) {

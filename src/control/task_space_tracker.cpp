@@ -6,7 +6,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "control/task_space_path.hpp"
+#include "softarm/control/task_space_path.hpp"
 #include "softarm/model/kinematics.hpp"
 
 namespace softarm {

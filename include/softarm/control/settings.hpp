@@ -30,7 +30,7 @@ struct TaskSpaceSettings {
   double lambda_1ps = 6.0;  ///< the tip's error law has both poles at -lambda: Lambda_p = lambda^2,
                             ///< Lambda_d = 2 lambda
   double tip_bandwidth_radps = 10.0;  ///< of the filter on what the tip is off the reference's own
-  double posture_rate_1ps = 0.5;      ///< null space of J: u decays at this rate, towards less bend
+  double posture_rate_1ps = 2.0;      ///< null space of J: u decays at this rate, towards less bend
 };
 
 struct ControllerSettings {
