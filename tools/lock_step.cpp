@@ -40,6 +40,7 @@ void LockStep::fill(LogRow& row) const {
   row.truth = arm_.plant().u_rad();
   row.real = arm_.measured_pressures_bar();
   row.tip = arm_.plant().tip_m();
+  row.coordinates = arm_.plant().coordinates();
 }
 
 void fill_from_pipeline(const ControlPipeline& pipeline, const ArmParameters& arm, LogRow& row) {

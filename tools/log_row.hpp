@@ -24,8 +24,7 @@ struct LogRow {
   std::optional<Eigen::Vector3d> tip, tip_reference;  ///< m, world
   bool tip_is_asked =
       false;  ///< tip_reference is a path of the tip (22), not the model's tip at u_ref
-  Eigen::VectorXd coordinates;  ///< the simulated arm's own where it has more than u: of its pieces
-                                ///< or joints, rad
+  Eigen::VectorXd coordinates;  ///< the simulated arm's own: of its segments, pieces or joints, rad
 };
 
 }  // namespace softarm

@@ -46,7 +46,21 @@ void TrackingSummary::add(const LogRow& row, double period_s) {
   ++active_ticks_;
   if (row.saturated) ++saturated_ticks_;
   if (std::isnan(active_since_s_)) active_since_s_ = row.t_s;
+  add_tip(row);
   if (row.t_s - active_since_s_ >= tracking_from_s_) add_tracking(row);
+}
+
+void TrackingSummary::add_tip(const LogRow& row) {
+  if (!row.tip || !row.tip_reference) return;
+  const double error = (*row.tip - *row.tip_reference).norm(), since = row.t_s - active_since_s_;
+  if (since >= tracking_from_s_) {
+    tip_squared_.emplace_back(row.t_s, error * error);
+    tip_max_m_ = std::isnan(tip_max_m_) ? error : std::max(tip_max_m_, error);
+  }
+  if (!row.tip_is_asked) return;
+  tip_is_asked_ = true;
+  if (error >= kTipNear_m || since < tip_last_s_) tip_last_far_s_ = since;
+  tip_last_s_ = since;
 }
 
 void TrackingSummary::add_tracking(const LogRow& row) {
@@ -67,8 +81,6 @@ void TrackingSummary::add_tracking(const LogRow& row) {
       phi_[index].add(angle_difference(std::atan2(reference.y(), reference.x()),
                                        std::atan2(truth.y(), truth.x())));
   }
-  if (row.tip && row.tip_reference)
-    tip_squared_.emplace_back(row.t_s, (*row.tip - *row.tip_reference).squaredNorm());
 }
 
 std::string TrackingSummary::json() const {
@@ -129,6 +141,12 @@ void TrackingSummary::write_tracking(JsonWriter& json) const {
   list("phi_rms_rad", phi_);
   json.member("tip_rms_m", tip.rms());
   json.member("tip_rms_second_half_m", tip_second_half.rms());
+  if (tip_is_asked_) {
+    json.member("tip_max_m", tip_max_m_);
+    json.member("tip_near_after_s", tip_last_far_s_ < tip_last_s_
+                                        ? tip_last_far_s_
+                                        : std::numeric_limits<double>::quiet_NaN());
+  }
   json.close_object();
 }
 
@@ -141,6 +159,22 @@ void TrackingSummary::write_frames(JsonWriter& json) const {
   json.member("missing", frames_->missing);
   json.member("late", late_frames_);
   json.close_object();
+}
+
+std::string TrackingSummary::tip_line() const {
+  MeanSquare tip;
+  for (const auto& [t_s, squared] : tip_squared_) {
+    tip.sum += squared;
+    ++tip.count;
+  }
+  const std::string arrived =
+      tip_last_far_s_ < tip_last_s_
+          ? fmt::format("within {:.0f} mm for good {:.2f} s after ACTIVE", 1e3 * kTipNear_m,
+                        tip_last_far_s_)
+          : fmt::format("not within {:.0f} mm at the end", 1e3 * kTipNear_m);
+  return fmt::format(
+      "tip error {:.3f} mm rms, {:.3f} mm at most, from {:g} s after ACTIVE on; {}\n",
+      1e3 * tip.rms(), 1e3 * tip_max_m_, tracking_from_s_, arrived);
 }
 
 std::string TrackingSummary::table() const {
@@ -158,6 +192,7 @@ std::string TrackingSummary::table() const {
   } else {
     text = "no tracking error: the true state is not known, or ACTIVE was too short\n";
   }
+  if (tip_is_asked_) text += tip_line();
   if (frames_)
     text += fmt::format("frames: {} accepted, {} rejected, {} repeated, {} missing\n",
                         frames_->accepted, frames_->rejected() + late_frames_, frames_->repeated,

@@ -17,7 +17,8 @@ namespace softarm {
 class JsonWriter;
 
 /// How well a reference was tracked, accumulated tick by tick: reference minus the plant's true u,
-/// from `tracking_from_s` after each ACTIVE on.
+/// from `tracking_from_s` after each ACTIVE on. Where the reference is a path of the tip, also when
+/// the tip came near it.
 class TrackingSummary {
  public:
   TrackingSummary(int segments, double tracking_from_s);
@@ -29,6 +30,9 @@ class TrackingSummary {
     frames_ = frames;
     late_frames_ = late;
   }
+
+  /// Nearer than this to its path, the tip has arrived.
+  static constexpr double kTipNear_m = 0.01;
 
   double duration_s() const { return ticks_ > 0 ? last_t_s_ - first_t_s_ : 0.0; }
 
@@ -58,6 +62,8 @@ class TrackingSummary {
     double rms() const;  ///< NaN when empty
   };
   void add_tracking(const LogRow& row);
+  void add_tip(const LogRow& row);
+  std::string tip_line() const;
   void write_tracking(JsonWriter& json) const;
   void write_frames(JsonWriter& json) const;
 
@@ -73,6 +79,10 @@ class TrackingSummary {
   double u_max_rad_ = std::numeric_limits<double>::quiet_NaN();
   std::vector<MeanSquare> u_of_segment_, theta_, phi_;
   std::vector<std::pair<double, double>> tip_squared_;  ///< time and squared error, for the halves
+  double tip_max_m_ = std::numeric_limits<double>::quiet_NaN();
+  bool tip_is_asked_ = false;    ///< the reference was a path of the tip
+  double tip_last_far_s_ = 0.0;  ///< after the latest ACTIVE: when the tip was last kTipNear_m off
+  double tip_last_s_ = 0.0;
   double pressure_max_bar_ = 0.0;
   std::array<double, 6> mode_s_{};
   std::vector<Transition> transitions_;

@@ -3,6 +3,7 @@ import numpy as np
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator
 
+from . import shapes
 from .run_log import wrapped
 from .style import CATEGORY, COMPONENT, ESTIMATE, INK, REFERENCE, at_least, finish, plt, thinned, time_axes
 
@@ -63,7 +64,7 @@ def _segment_colour(index):
 
 def figure9(log, directory):
     """phi and theta of every segment against the reference, as in the paper's figure 9."""
-    if log.u is None:
+    if log.u is None or shapes.has_parts(log):  # then figures 4 and 5 show more
         return None
     shown = _shown_segments(log)
     figure, grid = _grid(len(shown), 2)
@@ -346,4 +347,4 @@ def residuals(log, directory):
                              "expected chord, age of the newest frame at the tick, and when a limit cut the command.")
 
 
-ALL = (figure9, curvature, recording, pressures, tip_path, residuals, velocities, tick_times)
+ALL = (*shapes.ALL, figure9, curvature, recording, pressures, tip_path, residuals, velocities, tick_times)

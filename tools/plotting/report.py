@@ -52,7 +52,11 @@ def tracking_table(log, from_s):
     u_max = np.nanmax(tracking[:, 1]) if u_max is None else u_max
     rows.append(["all", "", "", _fixed(1e3 * u_rms, 2), _fixed(1e3 * u_max, 2)])
     if told.get("tip_rms_m") is not None:
-        rows.append(["tip [mm]", "", "", _fixed(1e3 * told["tip_rms_m"], 2), ""])
+        largest = told.get("tip_max_m")
+        rows.append(["tip [mm]", "", "", _fixed(1e3 * told["tip_rms_m"], 2),
+                     "" if largest is None else _fixed(1e3 * largest, 2)])
+    if told.get("tip_near_after_s") is not None:
+        rows.append(["tip within 10 mm after [s]", "", "", _fixed(told["tip_near_after_s"], 2), ""])
     return ["tracking error [mrad]", "θ rms", "φ rms", "u rms", "u max"], rows
 
 

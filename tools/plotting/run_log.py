@@ -134,3 +134,30 @@ class RunLog:
         largest = np.where(np.isnan(error), -np.inf, np.abs(error)).max(axis=(0, 2))
         return np.stack([rms(error, (0, 2)), np.where(np.isfinite(largest), largest, np.nan),
                          rms(theta_reference - theta, 0), rms(wrapped(phi_reference - phi), 0)], axis=-1)
+
+
+class ShapeLog:
+    """The simulated arm's shape, from shape.csv: bends (rows, parts, 2) in rad and points (rows, points, 3) in m."""
+
+    _known = {}
+
+    def __init__(self, path):
+        with open(path, encoding="utf-8") as file:
+            lines = [line for line in file.read().splitlines() if line and not line.startswith("#")]
+        names = lines[0].split(",")
+        rows = [line.split(",") for line in lines[1:]]
+        values = np.array([[_number(cell) for cell in row] for row in rows if len(row) == len(names)])
+        bends = [name.startswith("bend") for name in names]
+        points = [name.startswith("point") for name in names]
+        self.t_s = values[:, 0]
+        self.bends = values[:, bends].reshape(len(values), -1, 2)
+        self.points = values[:, points].reshape(len(values), -1, 3)
+        self.parts = self.bends.shape[1]
+
+    @classmethod
+    def of(cls, log):
+        """The shape beside a log, None where there is none."""
+        path = log.directory / "shape.csv"
+        if path not in cls._known:
+            cls._known[path] = cls(path) if path.exists() and path.stat().st_size > 0 else None
+        return cls._known[path]

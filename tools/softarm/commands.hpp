@@ -15,6 +15,9 @@ void add_check_command(CLI::App& app);
 /// softarm eval FILE [--mass point|distributed] [--method direct|augmented]
 void add_eval_command(CLI::App& app);
 
+/// softarm identify CONFIG [--output FILE] [--per-segment]
+void add_identify_command(CLI::App& app);
+
 /// softarm import CSV MAP.yaml --out LOG
 void add_import_command(CLI::App& app);
 

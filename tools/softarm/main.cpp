@@ -10,6 +10,7 @@ int main(int argc, char** argv) {
   softarm::add_bench_command(app);
   softarm::add_check_command(app);
   softarm::add_eval_command(app);
+  softarm::add_identify_command(app);
   softarm::add_import_command(app);
   softarm::add_run_command(app);
   softarm::add_watch_command(app);

@@ -14,6 +14,7 @@
 #include "logged_run.hpp"
 #include "program.hpp"
 #include "progress.hpp"
+#include "shape_log.hpp"
 #include "softarm/commands.hpp"
 #include "softarm/config/load.hpp"
 #include "softarm/daemon/realtime.hpp"
@@ -36,7 +37,7 @@ struct RunOptions {
 /// ns.
 template <class Stepper>
 std::int64_t record(Stepper& stepper, double duration_s, double period_s, ExperimentLog& log,
-                    TrackingSummary& summary) {
+                    ShapeLog& shapes, TrackingSummary& summary) {
   Progress progress;
   LogRow row;
   std::int64_t stepping_ns = 0;
@@ -46,6 +47,7 @@ std::int64_t record(Stepper& stepper, double duration_s, double period_s, Experi
     if (!stepper.step(row)) break;
     stepping_ns += monotonic_now_ns() - before_ns;
     log.add(row);
+    shapes.add(row);
     summary.add(row, period_s);
     if (progress.due())
       progress.update(fmt::format("{:.1f} of {:.1f} s, {}", row.t_s, duration_s, name(row.mode)));
@@ -91,7 +93,8 @@ int run(const RunOptions& options) {
   TimingReport timing;
   const auto record_and_report = [&](auto& stepper) {
     ExperimentLog log(options.out, experiment);
-    const std::int64_t took_ns = record(stepper, duration_s, period_s, log, summary);
+    ShapeLog shapes(options.out, experiment);
+    const std::int64_t took_ns = record(stepper, duration_s, period_s, log, shapes, summary);
     log.close();
     timing.real_time_factor =
         1e9 * summary.duration_s() / static_cast<double>(std::max<std::int64_t>(1, took_ns));
