@@ -139,6 +139,11 @@ void describe_kind(SchemaVisitor& visitor, PlantSettings& plant) {
     visitor.integer({"links_per_segment", "", "each with two crossed revolute joints at its start",
                      from_to(1, kMaxLinksPerSegment)},
                     links.links_per_segment);
+    static const std::array<const char*, 2> kJoints = {"crossed", "polar"};
+    visitor.choice({"joints", "",
+                    "crossed: two angles about x and y; polar: the paper's phi and theta, singular "
+                    "where straight, for comparison only"},
+                   kJoints, links.joints);
     visitor.optional_number(
         {"joint_stiffness_nm_per_rad", "N m/rad",
          "of every joint about each axis; left out: k times links_per_segment", from_to(0.0, 1e6)},

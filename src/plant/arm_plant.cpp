@@ -226,7 +226,7 @@ void ArmPlant::reset(ConstVectorRef u_rad, ConstVectorRef velocity_radps,
   Eigen::VectorXd x(self.system->size());
   Eigen::VectorXd v(self.system->size());
   self.system->spread(u_rad, x);
-  self.system->spread(velocity_radps, v);
+  self.system->spread_rate(u_rad, velocity_radps, v);
   self.integrator.reset(self.integrator.time_s(), x, v);
 }
 

@@ -7,6 +7,7 @@
 
 #include "plant/link_system.hpp"
 #include "plant/pcc_system.hpp"
+#include "plant/polar_link_system.hpp"
 
 namespace softarm {
 namespace {
@@ -67,6 +68,9 @@ ArmParameters pieces_of(const PlantSettings& settings) {
 }
 
 std::unique_ptr<PlantSystem> make_plant_system(const PlantSettings& settings) {
+  if (settings.kind == PlantKind::links && settings.links.joints == LinkJoints::polar) {
+    return std::make_unique<PolarLinkSystem>(settings);
+  }
   if (settings.kind == PlantKind::links) {
     return std::make_unique<LinkSystem>(settings);
   }

@@ -33,8 +33,10 @@ class PlantSystem : public SecondOrderSystem {
   /// Of gravity (zero at the world's origin) and bending.
   virtual double potential_energy_j(ConstVector x) = 0;
 
-  /// The x (or v) that uniform moments bending every segment by u (2n, rad) would give.
+  /// The x that uniform moments bending every segment by u (2n, rad) would give.
   virtual void spread(ConstVector u, Vector x) const = 0;
+  /// The v of it while u changes at `rate`.
+  virtual void spread_rate(ConstVector, ConstVector rate, Vector v) const { spread(rate, v); }
 
   /// World poses of the n actuated segments' ends.
   virtual void segment_ends(ConstVector x, std::span<Eigen::Isometry3d> ends) const = 0;

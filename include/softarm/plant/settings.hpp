@@ -52,11 +52,18 @@ struct RefinedSettings {
 
 inline constexpr int kMaxLinksPerSegment = 64;
 
+/// In which pair of angles the two joints of a link are told.
+enum class LinkJoints {
+  crossed,  ///< a about x, then b about y: smooth
+  polar  ///< the paper's phi and theta, (a, b) = theta (-sin phi, cos phi): singular where straight
+};
+
 /// `PlantKind::links`. Stiffness and damping act about each of the two axes of a joint; left out
 /// they are those of the segment times the number of its links, so that equal moments on the joints
 /// bend it as they bend the segment.
 struct LinkSettings {
   int links_per_segment = 6;
+  LinkJoints joints = LinkJoints::crossed;
   std::optional<double> joint_stiffness_nm_per_rad;
   std::optional<double> joint_damping_nms_per_rad;
 };
