@@ -135,7 +135,7 @@ def figure7(log, directory):
     extent = np.maximum(high - low, 0.3 * (high - low).max())
     middle = (high + low) / 2
     per_segment = (shape.points.shape[1] - 1) // log.segments
-    views = ((14, -58, 1.05, "in space"), (0, 0, 1.3, "along the x axis"))
+    views = ((14, -58, 0.93, "in space"), (0, 0, 1.15, "along the x axis"))
     for column, (elevation, azimuth, zoom, title) in enumerate(views):
         axes = figure.add_subplot(1, 2, column + 1, projection="3d", proj_type="ortho")
         axes.plot(*wanted.T, **REFERENCE_STYLE)
