@@ -135,9 +135,12 @@ void CurvatureController::feedback_u(ConstVectorRef u, ConstVectorRef velocity,
   const DynamicsTerms terms{settings_.terms.inertia, settings_.terms.coriolis,
                             settings_.terms.gravity};
   inverse_dynamics(arm_, workspace_, u, velocity, r.velocity, r.acceleration, terms, out.tau_u_nm);
-  out.tau_u_nm.array() += stiffness_.array() * r.u.array() + damping_.array() * r.velocity.array() +
-                          kp_.array() * (r.u - u).array() +
-                          kd_.array() * (r.velocity - velocity).array();
+  for (Eigen::Index i = 0; i < u.size(); i += 2) {  // two a segment: fixed sizes, no remainders
+    const auto at = [i](const auto& v) { return v.template segment<2>(i).array(); };
+    out.tau_u_nm.segment<2>(i).array() += at(stiffness_) * at(r.u) + at(damping_) * at(r.velocity) +
+                                          at(kp_) * (at(r.u) - at(u)) +
+                                          at(kd_) * (at(r.velocity) - at(velocity));
+  }
 }
 
 // (17) in q = [phi, theta], as a force in u: tau_u = P^-T tau_q with u' = P q', P = [theta t, n].

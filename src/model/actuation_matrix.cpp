@@ -57,6 +57,14 @@ void apply_actuation(const ArmParameters& arm, ConstVectorRef u, ConstVectorRef 
 
 void solve_actuation(const ArmParameters& arm, ConstVectorRef u, ConstVectorRef force_nm,
                      VectorRef tau_actuation_nm, double min_determinant) noexcept {
+  if (arm.actuation == ActuationModel::chamber) {  // the same matrix everywhere
+    for (Eigen::Index i = 0; i < force_nm.size(); i += 2) {
+      const double x = force_nm(i), y = force_nm(i + 1);
+      tau_actuation_nm(i) = -y;
+      tau_actuation_nm(i + 1) = x;
+    }
+    return;
+  }
   for (int i = 0; i < arm.size(); ++i) {
     const Eigen::Vector2d force = force_nm.segment<2>(2 * i);
     tau_actuation_nm.segment<2>(2 * i) =

@@ -64,8 +64,4 @@ struct SecondMoments {
   }
 };
 
-inline PairVector3 side_by_side(const Vector3& a, const Vector3& b) noexcept {
-  return {Pair{a.x, b.x}, Pair{a.y, b.y}, Pair{a.z, b.z}};
-}
-
 }  // namespace softarm

@@ -8,6 +8,7 @@
 // base. What a segment does within its own frame waits for nobody: four segments at a time
 // (segment_lanes.hpp).
 #include <Eigen/Core>
+#include <type_traits>
 
 #include "model/dynamics_storage.hpp"
 #include "softarm/model/dynamics.hpp"
@@ -91,8 +92,10 @@ struct FrameMotion {
 struct FrameAcceleration {
   Vector3 on_p, on_q, on_p1, on_q1;
 };
+/// The same of the base, which neither turns nor moves: nothing.
+struct StillFrame {};
 
-template <bool kInertia, bool kCoriolis>
+template <bool kCoriolis>
 inline FrameAcceleration frame_acceleration(const FrameMotion& m, const SegmentLanes& k,
                                             int l) noexcept {
   const double ux = k.ux[l], uy = k.uy[l];
@@ -124,6 +127,19 @@ inline Vector3 acceleration(double p, double q, double p1, double q1, const Vect
           base.y + p * f.on_p.y + q * f.on_q.y + p1 * f.on_p1.y + q1 * f.on_q1.y,
           base.z + p * f.on_p.z + q * f.on_q.z + p1 * f.on_p1.z};
 }
+inline Vector3 acceleration(double, double, double, double, const Vector3& base,
+                            StillFrame) noexcept {
+  return base;
+}
+
+/// (P1 u, Q1) . acceleration over the arc. The sweep's shares cancel: u . (v x z) + z . (v x u) =
+/// 0.
+inline double arc_stretch(const SegmentLanes& k, int l, const FrameAcceleration& f) noexcept {
+  const double ux = k.ux[l], uy = k.uy[l];
+  return k.arc.pp1[l] * (ux * f.on_p.x + uy * f.on_p.y) + k.arc.pq1[l] * f.on_p.z +
+         k.arc.qp1[l] * (ux * f.on_q.x + uy * f.on_q.y) + k.arc.qq1[l] * f.on_q.z;
+}
+inline double arc_stretch(const SegmentLanes&, int, StillFrame) noexcept { return 0.0; }
 
 /// [d(p u, q)/du]^T F with the derivative's stretch . F already summed.
 inline void set_torque(double ux, double uy, double x, double y, double stretch,
@@ -142,21 +158,50 @@ inline void point_forces(const SegmentLanes& k, int l, SegmentForces& out) noexc
 }
 
 /// Mass along the arc: the integrals of P, Q and (P1 u, Q1) times the acceleration.
-inline void arc_forces(const SegmentLanes& k, int l, const Vector3& weight,
-                       const FrameAcceleration& f, SegmentForces& out) noexcept {
+template <class Frame>
+inline void arc_forces(const SegmentLanes& k, int l, const Vector3& weight, const Frame& f,
+                       SegmentForces& out) noexcept {
   const double ux = k.ux[l], uy = k.uy[l];
   const auto& m = k.arc;
-  const double pp = m.pp[l], pq = m.pq[l], pp1 = m.pp1[l], pq1 = m.pq1[l], qp1 = m.qp1[l];
-  const Vector3 on_p = acceleration(pp, pq, pp1, pq1, k.centre.p[l] * weight + lane(k.own_p, l), f);
-  const Vector3 on_q =
-      acceleration(pq, m.qq[l], qp1, m.qq1[l], k.centre.q[l] * weight + lane(k.own_q, l), f);
-  // The sweep's shares in the stretch cancel: u . (v x z) + z . (v x u) = 0.
+  const Vector3 on_p = acceleration(m.pp[l], m.pq[l], m.pp1[l], m.pq1[l],
+                                    k.centre.p[l] * weight + lane(k.own_p, l), f);
+  const Vector3 on_q = acceleration(m.pq[l], m.qq[l], m.qp1[l], m.qq1[l],
+                                    k.centre.q[l] * weight + lane(k.own_q, l), f);
   const double stretch = k.own_stretch[l] + k.centre.p1[l] * (ux * weight.x + uy * weight.y) +
-                         k.centre.q1[l] * weight.z + pp1 * (ux * f.on_p.x + uy * f.on_p.y) +
-                         pq1 * f.on_p.z + qp1 * (ux * f.on_q.x + uy * f.on_q.y) +
-                         m.qq1[l] * f.on_q.z;
+                         k.centre.q1[l] * weight.z + arc_stretch(k, l, f);
   out.moment = {uy * on_p.z - on_q.y, on_q.x - ux * on_p.z, ux * on_p.y - uy * on_p.x};
   set_torque(ux, uy, on_p.x, on_p.y, stretch, out);
+}
+
+template <MassModel kMass, class Frame>
+inline void own_forces(const SegmentLanes& k, int l, const Vector3& base, const Frame& f,
+                       SegmentForces& out) noexcept {
+  const double mass = k.mass[l];
+  out.force = mass * acceleration(k.centre.p[l], k.centre.q[l], k.centre.p1[l], k.centre.q1[l],
+                                  base + lane(k.own_centre, l), f);
+  if constexpr (kMass == MassModel::point) {
+    point_forces(k, l, out);
+  } else {
+    arc_forces(k, l, mass * base, f, out);
+  }
+}
+
+/// From S_{i-1} to S_i.
+template <bool kCoriolis, class Frame>
+inline void advance(const SegmentLanes& k, int l, const Frame& f, FrameMotion& m) noexcept {
+  const Turn to_next = turn(k, l);
+  m.linear = rotate_back(to_next, acceleration(k.tip.p[l], k.tip.q[l], k.tip.p1[l], k.tip.q1[l],
+                                               m.linear + lane(k.own_tip, l), f));
+  m.angular += lane(k.own_spin, l);
+  if constexpr (kCoriolis) {
+    const Vector3 a = lane(k.spin_a, l), b = lane(k.spin_b, l);
+    if constexpr (!std::is_same_v<Frame, StillFrame>) {
+      m.angular += 0.5 * (cross(m.spin_a, b) + cross(m.spin_b, a));
+    }
+    m.spin_a = rotate_back(to_next, m.spin_a + a);
+    m.spin_b = rotate_back(to_next, m.spin_b + b);
+  }
+  m.angular = rotate_back(to_next, m.angular);
 }
 
 template <MassModel kMass, bool kInertia, bool kCoriolis>
@@ -168,39 +213,29 @@ void outward(const ArmParameters& arm, const Inputs& in, Vector3 base, SegmentLa
     SegmentLanes& k = lanes[i / kLanes];
     const int l = i % kLanes;
     if (l == 0) prepare<kMass, kInertia, kCoriolis>(arm, in, i, k);
-    const Turn to_next = turn(k, l);
-    SegmentForces& own = out[i];
+    const bool last = i + 1 == n;
     if constexpr (!kInertia && !kCoriolis) {
-      own.force = k.mass[l] * m.linear;
-      point_forces(k, l, own);
-      m.linear = rotate_back(to_next, m.linear);
+      out[i].force = k.mass[l] * m.linear;
+      point_forces(k, l, out[i]);
+      if (!last) m.linear = rotate_back(turn(k, l), m.linear);
+    } else if (i == 0) {
+      own_forces<kMass>(k, l, m.linear, StillFrame{}, out[i]);
+      if (!last) advance<kCoriolis>(k, l, StillFrame{}, m);
     } else {
-      const FrameAcceleration f = frame_acceleration<kInertia, kCoriolis>(m, k, l);
-      own.force = k.mass[l] * acceleration(k.centre.p[l], k.centre.q[l], k.centre.p1[l],
-                                           k.centre.q1[l], m.linear + lane(k.own_centre, l), f);
-      if constexpr (kMass == MassModel::point) {
-        point_forces(k, l, own);
-      } else {
-        arc_forces(k, l, k.mass[l] * m.linear, f, own);
-      }
-      m.linear = rotate_back(to_next, acceleration(k.tip.p[l], k.tip.q[l], k.tip.p1[l], k.tip.q1[l],
-                                                   m.linear + lane(k.own_tip, l), f));
-      m.angular += lane(k.own_spin, l);
-      if constexpr (kCoriolis) {
-        const Vector3 a = lane(k.spin_a, l), b = lane(k.spin_b, l);
-        m.angular += 0.5 * (cross(m.spin_a, b) + cross(m.spin_b, a));
-        m.spin_a = rotate_back(to_next, m.spin_a + a);
-        m.spin_b = rotate_back(to_next, m.spin_b + b);
-      }
-      m.angular = rotate_back(to_next, m.angular);
+      const FrameAcceleration f = frame_acceleration<kCoriolis>(m, k, l);
+      own_forces<kMass>(k, l, m.linear, f, out[i]);
+      if (!last) advance<kCoriolis>(k, l, f, m);
     }
   }
 }
 
 void inward(int n, const SegmentLanes* lanes, const SegmentForces* segments, double* out) noexcept {
+  const SegmentForces& last = segments[n - 1];
+  out[2 * n - 2] = last.torque_x;
+  out[2 * n - 1] = last.torque_y;
   // Lanes of a Pair: force and moment (about p_i) of everything beyond p_i.
-  PairVector3 beyond{Pair{0, 0}, Pair{0, 0}, Pair{0, 0}};
-  for (int i = n - 1; i >= 0; --i) {
+  PairVector3 beyond = side_by_side(last.force, last.moment);
+  for (int i = n - 2; i >= 0; --i) {
     const SegmentLanes& k = lanes[i / kLanes];
     const int l = i % kLanes;
     const SegmentForces& own = segments[i];
@@ -212,10 +247,9 @@ void inward(int n, const SegmentLanes* lanes, const SegmentForces* segments, dou
                            k.turn_rate.c3[l] * (ux * moment.y - uy * moment.x);
     out[2 * i] = own.torque_x + p * force.x + c1 * moment.y + stretch * ux - twist * uy;
     out[2 * i + 1] = own.torque_y + p * force.y - c1 * moment.x + stretch * uy + twist * ux;
+    if (i == 0) return;
     const Vector3 lever = cross(Vector3{p * ux, p * uy, k.tip.q[l]}, force);
-    beyond.x += Pair{own.force.x, own.moment.x + lever.x};
-    beyond.y += Pair{own.force.y, own.moment.y + lever.y};
-    beyond.z += Pair{own.force.z, own.moment.z + lever.z};
+    beyond += side_by_side(own.force, own.moment + lever);
   }
 }
 
