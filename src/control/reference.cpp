@@ -9,6 +9,7 @@
 
 #include "control/blend.hpp"
 #include "control/reference_curves.hpp"
+#include "control/soft_limit.hpp"
 #include "control/task_space_tracker.hpp"
 #include "softarm/control/task_space_path.hpp"
 #include "softarm/model/kinematics.hpp"
@@ -17,7 +18,6 @@ namespace softarm {
 namespace {
 
 constexpr double kQuinticPeakSpeed = 1.875;
-constexpr double kKnee = 0.98;          ///< of max_theta_rad: from here on theta is bent
 constexpr double kShortestLive = 0.05;  ///< s, for a live reference that is corrected a little
 
 double largest_norm(const SegmentVector& v) noexcept {
@@ -35,30 +35,6 @@ void resize(ReferenceSample& sample, int dof) noexcept {
   sample.has_polar = false;
   sample.limited = false;
   sample.has_tip = false;
-}
-
-/// Bends u inside of theta < limit: theta -> knee + w tanh((theta - knee) / w), w = limit - knee;
-/// C2, exact chain rule.
-bool bend_inside(double limit, ReferenceSample& sample) noexcept {
-  const double knee = kKnee * limit, w = limit - knee;
-  bool bent = false;
-  for (Eigen::Index i = 0; i < sample.u.size(); i += 2) {
-    auto u = sample.u.segment<2>(i), ud = sample.velocity.segment<2>(i),
-         udd = sample.acceleration.segment<2>(i);
-    const double r = u.norm();
-    if (r <= knee) continue;
-    bent = true;
-    const Eigen::Vector2d n = u / r;
-    const double rd = n.dot(ud), rdd = (ud.squaredNorm() + u.dot(udd) - rd * rd) / r;
-    const Eigen::Vector2d nd = (ud - rd * n) / r, ndd = (udd - rdd * n - 2.0 * rd * nd) / r;
-    const double s = std::tanh((r - knee) / w), slope = 1.0 - s * s;
-    const double bent_r = knee + w * s, bent_rd = slope * rd;
-    const double bent_rdd = slope * rdd - 2.0 * s * slope / w * rd * rd;
-    u = bent_r * n;
-    ud = bent_rd * n + bent_r * nd;
-    udd = bent_rdd * n + 2.0 * bent_rd * nd + bent_r * ndd;
-  }
-  return bent;
 }
 
 }  // namespace

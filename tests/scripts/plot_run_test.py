@@ -1,4 +1,5 @@
 """tools/plot_run.py on small logs whose numbers are known."""
+import json
 import math
 import pathlib
 import subprocess
@@ -14,7 +15,7 @@ except ImportError:
 
 TOOLS = pathlib.Path(__file__).resolve().parents[2] / "tools"
 sys.path.insert(0, str(TOOLS))
-from plotting.run_log import RunLog  # noqa: E402
+from plotting.run_log import RunLog, ShapeLog  # noqa: E402
 
 PERIOD_S = 0.02
 OFFSET = (0.003, 0.004)  # reference minus truth, rad
@@ -85,6 +86,25 @@ class PlotRun(unittest.TestCase):
         page = (self.directory / "report.html").read_text(encoding="utf-8")
         self.assertEqual(page.count("data:image/png;base64,"), len(pictures))
         self.assertIn("small_test", page)
+
+    def test_links_and_a_path_of_the_tip_give_figures_4_to_7(self):
+        write_log(self.directory, 2)
+        names = ["t_s"] + [f"bend{j}_{axis}_rad" for j in range(1, 7) for axis in "xy"]
+        names += [f"point{j}_{axis}_m" for j in range(7) for axis in "xyz"]
+        rows = [[0.02 * k] + [0.1, 0.01 * k] * 6 + [0.001 * k, 0.0, 0.0] * 7 for k in range(200)]
+        text = "# origin\n" + ",".join(names) + "\n" + "\n".join(",".join(map(str, row)) for row in rows)
+        (self.directory / "shape.csv").write_text(text + "\n0.5,0.1", encoding="utf-8")  # cut off within a row
+        told = {"tracking": {"tip_rms_m": 0.001, "tip_max_m": 0.002, "tip_near_after_s": 1.5}}
+        (self.directory / "summary.json").write_text(json.dumps(told), encoding="utf-8")
+        shape = ShapeLog.of(RunLog(self.directory))
+        self.assertEqual((shape.parts, shape.points.shape), (6, (200, 7, 3)))
+        self.assertAlmostEqual(shape.bends[100, 5, 1], 1.0)
+        result = run(self.directory)
+        self.assertEqual((result.returncode, result.stderr), (0, ""))
+        self.assertIn("tip within 10 mm after [s]", result.stdout)
+        pictures = {path.stem for path in self.directory.glob("*.png")}
+        self.assertTrue({"figure4", "figure5", "figure6", "figure7"} <= pictures)
+        self.assertNotIn("figure9", pictures)
 
     def test_a_recording_has_neither_truth_nor_tip(self):
         write_log(self.directory, 1, truth=False, reference=False)
