@@ -1,0 +1,73 @@
+// Keys of the simulated arm and of actuation by torque: read, refused, printed and read again.
+#include <gtest/gtest.h>
+
+#include "softarm/config/config_error.hpp"
+#include "softarm/config/load.hpp"
+#include "unit/config/config_files.hpp"
+
+namespace softarm {
+namespace {
+
+constexpr const char* kArm = R"(name: links
+arm: {segments: 2, length_m: 0.25, mass_kg: 0.25, stiffness_nm_per_rad: 2, damping_nms_per_rad: 0.5}
+actuation: {kind: torque, max_torque_nm: 20}
+control: {kp_nm_per_rad: 1}
+reference:
+  - {kind: set_point, theta_rad: 0.2}
+)";
+
+constexpr const char* kPlant = R"(plant:
+  kind: links
+  links: {links_per_segment: 6, joint_stiffness_nm_per_rad: 12, joint_damping_nms_per_rad: 3}
+  valves: {dead_time_s: 0.01, slew_bar_per_s: 500, resolution_bar: 0.01}
+  loads:
+    - {segment: 1, force_n: [1, 0, 0], start_s: 2, duration_s: 0.5}
+    - {moment_nm: [0, 0.1, 0], shape: half_sine, start_s: 1, duration_s: 0.01}
+  payload_kg: [0, 0.1]
+  base_motion: {amplitude_m: [0.01, 0, 0], frequency_hz: 2}
+)";
+
+TEST(PlantKeys, AreReadAndWhatIsPrintedReadsTheSame) {
+  const TestFolder folder;
+  const Experiment first = load_experiment(folder.write("a.yaml", std::string(kArm) + kPlant));
+  const PlantSettings& plant = first.plant;
+  EXPECT_EQ(first.actuation.kind, ActuationKind::torque);
+  EXPECT_EQ(plant.actuation.kind, ActuationKind::torque);
+  EXPECT_EQ(plant.actuation.segments.size(), 2u);
+  EXPECT_EQ(plant.valves.supply_pressure_bar, 20.0);
+  EXPECT_EQ(plant.actuation.min_pressure_bar, -20.0);
+  EXPECT_EQ(plant.kind, PlantKind::links);
+  EXPECT_EQ(plant.links.joint_stiffness_nm_per_rad, 12.0);
+  EXPECT_EQ(plant.method, IntegratorMethod::sdirk2);
+  EXPECT_EQ(plant.valves.dead_time_s, 0.01);
+  ASSERT_EQ(plant.loads.size(), 2u);
+  EXPECT_EQ(plant.loads[1].shape, LoadShape::half_sine);
+  EXPECT_EQ(plant.payload_kg, (std::vector<double>{0.0, 0.1}));
+  EXPECT_EQ(plant.base_motion.frequency_hz, 2.0);
+  const Experiment again = load_experiment(folder.write("b.yaml", resolved_text(first)));
+  EXPECT_EQ(resolved_text(again), resolved_text(first));
+  EXPECT_EQ(again.hash, first.hash);
+}
+
+TEST(PlantKeys, TorqueIsForSimulatedArmsAlone) {
+  const TestFolder folder;
+  const auto refuses = [&](const std::string& more, const std::string& key) {
+    try {
+      load_experiment(folder.write("bad.yaml", kArm + more));
+      ADD_FAILURE() << more << " was accepted";
+    } catch (const ConfigError& error) {
+      EXPECT_NE(std::string(error.what()).find(key), std::string::npos) << error.what();
+    }
+  };
+  refuses("daemon: {safety: {valve_readback: true}}\n", "valve_readback");
+  refuses(
+      "plant: {actuation: {kind: chambers, chambers: {angle_rad: [0, 2, 4], gain_nm_per_bar: "
+      "1}}}\n",
+      "plant.actuation");
+  refuses("plant: {kind: linsk}\n", "plant.kind");
+  refuses("plant: {loads: [{segment: 3}]}\n", "plant.loads[0].segment");
+  refuses("plant: {refined: {pieces: 2, mass_weights: [1, 2, 3]}}\n", "plant.refined.mass_weights");
+}
+
+}  // namespace
+}  // namespace softarm
