@@ -102,7 +102,9 @@ TEST_P(Surrounded, PayloadIsMassTimesAccelerationLessGravity) {
     State state = some_state(bare);
     const Eigen::VectorXd change = effect(loaded, bare, state.x, state.v, state.a);
     const double h = 1e-3;
-    const auto point = [&](double t) { return end_at(bare, state, segment, t).translation(); };
+    const auto point = [&](double t) -> Eigen::Vector3d {
+      return end_at(bare, state, segment, t).translation();
+    };
     const Eigen::Vector3d acceleration =
         (-point(2 * h) + 16 * point(h) - 30 * point(0.0) + 16 * point(-h) - point(-2 * h)) /
         (12 * h * h);
