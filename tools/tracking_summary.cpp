@@ -38,7 +38,8 @@ void TrackingSummary::add(const LogRow& row, double period_s) {
   if (changed && transitions_.size() < kMaxTransitions)
     transitions_.push_back({row.t_s, row.mode, row.reason});
   if (row.commanded.size() > 0)
-    pressure_max_bar_ = std::max(pressure_max_bar_, row.commanded.maxCoeff());
+    command_max_ = std::max(
+        command_max_, torques_ ? row.commanded.cwiseAbs().maxCoeff() : row.commanded.maxCoeff());
   if (row.mode != Mode::active) {
     active_since_s_ = std::numeric_limits<double>::quiet_NaN();
     return;
@@ -90,9 +91,9 @@ std::string TrackingSummary::json() const {
   json.member("ticks", ticks_);
   json.key("tracking");
   write_tracking(json);
-  json.key("pressure_bar");
+  json.key(torques_ ? "torque_nm" : "pressure_bar");
   json.open_object();
-  json.member("max", pressure_max_bar_);
+  json.member("max", command_max_);
   json.close_object();
   json.member("saturated_fraction", active_ticks_ > 0 ? static_cast<double>(saturated_ticks_) /
                                                             static_cast<double>(active_ticks_)
@@ -201,9 +202,9 @@ std::string TrackingSummary::table() const {
       active_ticks_ > 0
           ? 100.0 * static_cast<double>(saturated_ticks_) / static_cast<double>(active_ticks_)
           : 0.0;
-  text +=
-      fmt::format("largest commanded pressure {:.3f} bar; saturated {:.2f} % of {} active ticks\n",
-                  pressure_max_bar_, saturated_percent, active_ticks_);
+  text += fmt::format("largest commanded {} {:.3f} {}; saturated {:.2f} % of {} active ticks\n",
+                      torques_ ? "moment" : "pressure", command_max_, torques_ ? "N m" : "bar",
+                      saturated_percent, active_ticks_);
   return text;
 }
 

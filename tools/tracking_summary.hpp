@@ -23,6 +23,9 @@ class TrackingSummary {
  public:
   TrackingSummary(int segments, double tracking_from_s);
 
+  /// Commands are moments (N m), not pressures (bar).
+  void commands_are_torques() { torques_ = true; }
+
   void add(const LogRow& row, double period_s);
 
   /// Tells what became of the frames; without it the summary does not speak of them.
@@ -83,7 +86,8 @@ class TrackingSummary {
   bool tip_is_asked_ = false;    ///< the reference was a path of the tip
   double tip_last_far_s_ = 0.0;  ///< after the latest ACTIVE: when the tip was last kTipNear_m off
   double tip_last_s_ = 0.0;
-  double pressure_max_bar_ = 0.0;
+  double command_max_ = 0.0;  ///< bar, or N m
+  bool torques_ = false;
   std::array<double, 6> mode_s_{};
   std::vector<Transition> transitions_;
   std::optional<FrameCounters> frames_;

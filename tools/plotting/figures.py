@@ -195,16 +195,18 @@ def pressures(log, directory):
             chambers = max(chambers, values.shape[1])
             for j in range(values.shape[1]):
                 axes.plot(t, values[:, j], color=CATEGORY[j % len(CATEGORY)], **style)
-        axes.set_ylabel(f"segment {segment + 1} [bar]")
+        axes.set_ylabel(f"segment {segment + 1} [{'N m' if log.torques else 'bar'}]")
         axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
         at_least(axes, 0.05)
     modes = time_axes(grid, log)
-    handles = [Line2D([], [], color=CATEGORY[j % len(CATEGORY)], label=f"chamber {j + 1}") for j in range(min(chambers, 8))]
+    labels = ["$\\tau_x$", "$\\tau_y$"] if log.torques else [f"chamber {j + 1}" for j in range(min(chambers, 8))]
+    handles = [Line2D([], [], color=CATEGORY[j % len(CATEGORY)], label=label) for j, label in enumerate(labels)]
     if kinds == {"p", "pm"}:
         handles += [Line2D([], [], color=INK, linewidth=0.8, alpha=0.55, label="commanded"),
                     Line2D([], [], color=INK, linewidth=1.3, label="behind the valve")]
-    finish(figure, directory / "pressures.png", "Chamber pressures" + _selection_note(log), handles + modes)
-    return "pressures.png", "Chamber pressures above ambient."
+    title = "Moments" if log.torques else "Chamber pressures"
+    finish(figure, directory / "pressures.png", title + _selection_note(log), handles + modes)
+    return "pressures.png", "Moments about the local x and y axes." if log.torques else "Chamber pressures above ambient."
 
 
 def tip_path(log, directory):

@@ -70,7 +70,8 @@ def pressure_table(log):
         numbers = [np.nanmax(v) if v is not None else None for v in (commanded, real)]
         numbers.append(np.nanmean(commanded if commanded is not None else real))
         rows.append([f"segment {segment}"] + [_fixed(v, 3) for v in numbers])
-    return (["pressure [bar]", "commanded, max", "behind the valve, max", "mean"], rows) if rows else None
+    quantity = "moment [N m]" if log.torques else "pressure [bar]"
+    return ([quantity, "commanded, max", "behind the valve, max", "mean"], rows) if rows else None
 
 
 def timing_table(log):

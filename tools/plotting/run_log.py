@@ -42,6 +42,7 @@ class RunLog:
         self._cache = {}
         self.summary = _read_json(self.directory / "summary.json")
         self.timing = _read_json(self.directory / "timing.json")
+        self.torques = "torque_nm" in self.summary  # commands are moments: what is named _bar counts N m
 
         self.t_s = self.column("t_s")
         self.mode = np.array(self._text.get("mode", ("",) * len(self.t_s)))

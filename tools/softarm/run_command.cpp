@@ -90,6 +90,7 @@ int run(const RunOptions& options) {
   const double period_s = 1.0 / experiment.daemon.rate_hz;
 
   TrackingSummary summary(experiment.arm.size(), experiment.run.tracking_from_s);
+  if (experiment.actuation.kind == ActuationKind::torque) summary.commands_are_torques();
   TimingReport timing;
   const auto record_and_report = [&](auto& stepper) {
     ExperimentLog log(options.out, experiment);

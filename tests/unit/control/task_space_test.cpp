@@ -163,7 +163,7 @@ TEST(DampedInverse, IsBoundedAndContinuousThroughTheStraightPose) {
 TEST(TaskSpace, TheTipOfAnExactArmIsOnThePathOnceItIsJoined) {
   for (int n : {3, 4, 10}) {  // two segments do not reach all of (22)
     ExactArm arm(long_arm(n), only(TipPathReference{}), settings(n, 10.0, 20.0));
-    arm.start(VectorXd::Constant(2 * n, 0.3));
+    arm.start(VectorXd::Constant(2 * n, 1.0 / n));
     arm.run(4.0);  // blend_s = 1, then three seconds to forget the start at a singular pose
     for (int k = 0; k < 1000; ++k) {
       arm.tick();
