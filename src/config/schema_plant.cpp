@@ -214,17 +214,19 @@ void describe_plant(SchemaVisitor& visitor, Experiment& experiment) {
     plant.initial_u_rad = Eigen::Map<const Eigen::VectorXd>(u.data(), 2 * n);
   });
   describe_world(visitor, plant);
-  static const std::array<const char*, 3> kMethods = {"sdirk2", "cash4", "sdirk4"};
+  static const std::array<const char*, 7> kMethods = {"sdirk2",    "cash4",       "sdirk4", "erk",
+                                                      "cvode_bdf", "cvode_adams", "ida"};
   if (visitor.reading() && plant.kind != PlantKind::pcc) {
     // Arms of many light parts answer a step of the torque within microseconds. Error control that
     // resolves this costs a hundred times more and gains nothing that a motion shows.
     plant.method = IntegratorMethod::sdirk2;
     plant.absolute_tolerance = 1e-6;
   }
-  visitor.choice({"integrator", "",
-                  "diagonally implicit Runge-Kutta method of SUNDIALS ARKODE; left out: cash4, or "
-                  "sdirk2 where kind is not pcc"},
-                 kMethods, plant.method);
+  visitor.choice(
+      {"integrator", "",
+       "method of SUNDIALS: one-step and implicit (sdirk2, cash4, sdirk4) or explicit "
+       "(erk), multistep (the others); left out: cash4, or sdirk2 where kind is not pcc"},
+      kMethods, plant.method);
   visitor.number({"relative_tolerance", "", "of the integrator", from_to(1e-13, 1e-2)},
                  plant.relative_tolerance);
   visitor.number({"absolute_tolerance", "rad",

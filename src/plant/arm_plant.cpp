@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "plant/arkode_integrator.hpp"
+#include "plant/integrator.hpp"
 #include "plant/plant_system.hpp"
 
 namespace softarm {
@@ -111,9 +111,10 @@ struct ArmPlant::Implementation {
                settings.actuation.kind == ActuationKind::torque),
         map(chamber_map(settings.actuation)),
         system(make_plant_system(settings)),
-        integrator(*system, integrator_settings(settings)),
+        integrator(make_integrator(*system, integrator_settings(settings))),
         present_nm(Eigen::VectorXd::Zero(arm.dof())),
         target_nm(Eigen::VectorXd::Zero(arm.dof())),
+        driven_nm(Eigen::VectorXd::Zero(arm.dof())),
         ends(static_cast<std::size_t>(arm.size())) {
     Eigen::VectorXd u = Eigen::VectorXd::Zero(arm.dof());
     if (settings.initial_u_rad.size() > 0) {
@@ -122,36 +123,42 @@ struct ArmPlant::Implementation {
     drive();
     Eigen::VectorXd x(system->size());
     system->spread(u, x);
-    integrator.reset(0.0, x, Eigen::VectorXd::Zero(x.size()));
+    integrator->reset(0.0, x, Eigen::VectorXd::Zero(x.size()));
   }
 
   /// Tells the equation of motion what the valves will do from now on.
   void drive() {
     if (valves.slewed()) {
-      system->input().follow(integrator.time_s(), valves, map);
-      return;
+      system->input().follow(integrator->time_s(), valves, map);
+    } else {
+      present_nm.noalias() = map * valves.pressures_bar();
+      target_nm.noalias() = map * valves.commanded_bar();
+      system->drive(integrator->time_s(), present_nm, target_nm, lag_s);
+      if (lag_s == 0.0 && target_nm != driven_nm) {
+        jumped = true;
+        driven_nm = target_nm;
+      }
     }
-    present_nm.noalias() = map * valves.pressures_bar();
-    target_nm.noalias() = map * valves.commanded_bar();
-    system->drive(integrator.time_s(), present_nm, target_nm, lag_s);
+    if (jumped) integrator->input_jumped();
+    jumped = false;
   }
 
   /// Lets happen what is due: commands after their dead time, loads that begin or end.
   void meet_events() {
-    const double now = integrator.time_s();
+    const double now = integrator->time_s();
     while (!pending.empty() && pending.front().due_s <= now) {
       valves.command(pending.front().command_bar);
       pending.pop_front();
     }
-    system->surroundings().enter(now);
+    jumped |= system->surroundings().enter(now);
   }
 
   Eigen::Vector3d displacement_m() const {
-    return system->surroundings().base_displacement_m(integrator.time_s());
+    return system->surroundings().base_displacement_m(integrator->time_s());
   }
 
   double next_event_s() const {
-    const double load_s = system->surroundings().until(integrator.time_s());
+    const double load_s = system->surroundings().until(integrator->time_s());
     return pending.empty() ? load_s : std::min(load_s, pending.front().due_s);
   }
 
@@ -166,8 +173,10 @@ struct ArmPlant::Implementation {
   Valves valves;
   Eigen::MatrixXd map;
   std::unique_ptr<PlantSystem> system;
-  ArkodeIntegrator integrator;
+  std::unique_ptr<Integrator> integrator;
   Eigen::VectorXd present_nm, target_nm;
+  Eigen::VectorXd driven_nm;  // the torque of the last call without a lag
+  bool jumped = false;        // the input did, since the integrator was last told
   std::deque<PendingCommand> pending;
   mutable std::vector<Eigen::Isometry3d> ends;
 };
@@ -186,7 +195,7 @@ void ArmPlant::command(std::span<const double> command_bar) {
   Implementation& self = *implementation_;
   if (self.dead_time_s > 0.0) {
     self.pending.push_back(
-        {self.integrator.time_s() + self.dead_time_s, {command_bar.begin(), command_bar.end()}});
+        {self.integrator->time_s() + self.dead_time_s, {command_bar.begin(), command_bar.end()}});
     return;
   }
   self.valves.command(command_bar);
@@ -195,10 +204,10 @@ void ArmPlant::command(std::span<const double> command_bar) {
 
 void ArmPlant::advance(double t_end_s) {
   Implementation& self = *implementation_;
-  while (t_end_s > self.integrator.time_s()) {
-    const double from_s = self.integrator.time_s();
+  while (t_end_s > self.integrator->time_s()) {
+    const double from_s = self.integrator->time_s();
     const double to_s = std::min(t_end_s, self.next_event_s());
-    self.integrator.advance(to_s);
+    self.integrator->advance(to_s);
     self.valves.advance(to_s - from_s);
     self.meet_events();
     self.drive();
@@ -227,20 +236,20 @@ void ArmPlant::reset(ConstVectorRef u_rad, ConstVectorRef velocity_radps,
   Eigen::VectorXd v(self.system->size());
   self.system->spread(u_rad, x);
   self.system->spread_rate(u_rad, velocity_radps, v);
-  self.integrator.reset(self.integrator.time_s(), x, v);
+  self.integrator->reset(self.integrator->time_s(), x, v);
 }
 
-double ArmPlant::time_s() const noexcept { return implementation_->integrator.time_s(); }
-Eigen::VectorXd ArmPlant::coordinates() const noexcept { return implementation_->integrator.x(); }
+double ArmPlant::time_s() const noexcept { return implementation_->integrator->time_s(); }
+Eigen::VectorXd ArmPlant::coordinates() const noexcept { return implementation_->integrator->x(); }
 Eigen::VectorXd ArmPlant::coordinate_rates() const noexcept {
-  return implementation_->integrator.v();
+  return implementation_->integrator->v();
 }
 
 void ArmPlant::curvature(SegmentVector& u_rad, SegmentVector& velocity_radps) const noexcept {
   const Implementation& self = *implementation_;
   u_rad.resize(self.arm.dof());
   velocity_radps.resize(self.arm.dof());
-  self.system->curvature(self.integrator.x(), self.integrator.v(), u_rad, velocity_radps);
+  self.system->curvature(self.integrator->x(), self.integrator->v(), u_rad, velocity_radps);
 }
 
 SegmentVector ArmPlant::u_rad() const noexcept {
@@ -270,7 +279,7 @@ Eigen::Isometry3d ArmPlant::base() const noexcept {
 }
 
 void ArmPlant::segment_ends(std::span<Eigen::Isometry3d> segment_ends) const noexcept {
-  implementation_->system->segment_ends(implementation_->integrator.x(), segment_ends);
+  implementation_->system->segment_ends(implementation_->integrator->x(), segment_ends);
   if (implementation_->system->surroundings().base_moves()) {
     const Eigen::Vector3d displacement = implementation_->displacement_m();
     for (Eigen::Isometry3d& end : segment_ends) end.translation() += displacement;
@@ -284,14 +293,14 @@ Eigen::Vector3d ArmPlant::tip_m() const noexcept {
 
 PlantEnergies ArmPlant::energies() const noexcept {
   const Implementation& self = *implementation_;
-  return {.kinetic = self.system->kinetic_energy_j(self.integrator.x(), self.integrator.v()),
-          .potential = self.system->potential_energy_j(self.integrator.x()),
-          .supplied = self.integrator.supplied_j(),
-          .dissipated = self.integrator.dissipated_j()};
+  return {.kinetic = self.system->kinetic_energy_j(self.integrator->x(), self.integrator->v()),
+          .potential = self.system->potential_energy_j(self.integrator->x()),
+          .supplied = self.integrator->supplied_j(),
+          .dissipated = self.integrator->dissipated_j()};
 }
 
 IntegratorCounters ArmPlant::counters() const noexcept {
-  return implementation_->integrator.counters();
+  return implementation_->integrator->counters();
 }
 
 }  // namespace softarm

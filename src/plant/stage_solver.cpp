@@ -103,4 +103,29 @@ bool StageSolver::solve(const Stage& stage) {
   return true;
 }
 
+bool StageSolver::correct(double t_s, double gamma_s, const Eigen::VectorXd& s,
+                          const double* prediction, const double* weights, double tolerance,
+                          const double* guess, bool energy, double* correction) {
+  using ConstMap = Eigen::Map<const Eigen::VectorXd>;
+  const Eigen::Index n = a_.size();
+  if (guess != nullptr) a_ = ConstMap(guess, n);
+  const Stage stage{.t_s = t_s,
+                    .gamma_s = gamma_s,
+                    .s_x = ConstMap(s.data(), n),
+                    .s_v = ConstMap(s.data() + n, n),
+                    .weight_x = ConstMap(weights, n),
+                    .weight_v = ConstMap(weights + n, n),
+                    .tolerance = tolerance,
+                    .components = static_cast<double>(s.size())};
+  if (!solve(stage)) return false;
+  Eigen::Map<Eigen::VectorXd>(correction, n) = x_ - ConstMap(prediction, n);
+  Eigen::Map<Eigen::VectorXd>(correction + n, n) = v_ - ConstMap(prediction + n, n);
+  if (energy) {
+    const auto powers = system_.powers(t_s, x_, v_);
+    correction[2 * n] = s[2 * n] + gamma_s * powers.supplied_w - prediction[2 * n];
+    correction[2 * n + 1] = s[2 * n + 1] + gamma_s * powers.dissipated_w - prediction[2 * n + 1];
+  }
+  return true;
+}
+
 }  // namespace softarm

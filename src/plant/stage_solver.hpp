@@ -33,8 +33,18 @@ class StageSolver {
   /// are not finite.
   bool solve(const Stage& stage);
 
+  /// The same for SUNDIALS' implicit equation z = s + gamma f(t, z) of y = (x, v) or, with
+  /// `energy`, (x, v, work supplied, work dissipated): correction = z - prediction. @param weights
+  /// 1 / allowed error of every component. @param guess of a, or null: the last a found.
+  bool correct(double t_s, double gamma_s, const Eigen::VectorXd& s, const double* prediction,
+               const double* weights, double tolerance, const double* guess, bool energy,
+               double* correction);
+
   /// Forgets everything learnt: the next stage linearizes anew and guesses from `acceleration`.
   void reset(SecondOrderSystem::ConstVector acceleration);
+
+  /// The next stage linearizes anew.
+  void forget() { linearized_ = false; }
 
   const Eigen::VectorXd& x() const { return x_; }
   const Eigen::VectorXd& v() const { return v_; }

@@ -72,12 +72,16 @@ double Surroundings::until(double t_s) const {
   return next;
 }
 
-void Surroundings::enter(double t_s) {
+bool Surroundings::enter(double t_s) {
   any_on_ = false;
+  bool switched = false;
   for (Load& load : loads_) {
-    load.on = load.start_s <= t_s && t_s < load.end_s;
-    any_on_ |= load.on;
+    const bool on = load.start_s <= t_s && t_s < load.end_s;
+    switched |= on != load.on;
+    load.on = on;
+    any_on_ |= on;
   }
+  return switched;
 }
 
 Eigen::Vector3d Surroundings::base_displacement_m(double t_s) const {

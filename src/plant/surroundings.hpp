@@ -32,8 +32,8 @@ class Surroundings {
 
   /// The first instant after t_s at which a load begins or ends; infinity if none does.
   double until(double t_s) const;
-  /// From t_s until the next of these instants.
-  void enter(double t_s);
+  /// From t_s until the next of these instants. Returns whether a load was switched on or off.
+  bool enter(double t_s);
 
   Eigen::Vector3d base_displacement_m(double t_s) const;
   Eigen::Vector3d base_acceleration_mps2(double t_s) const;

@@ -92,12 +92,17 @@ struct BaseMotion {
   double phase_rad = 0.0;
 };
 
-/// Which diagonally implicit Runge-Kutta method of ARKODE integrates (stiffly accurate, no explicit
-/// first stage).
+/// Which method of SUNDIALS integrates. The first three are diagonally implicit Runge-Kutta methods
+/// (stiffly accurate, no explicit first stage): a sampled command costs them nothing. The multistep
+/// methods start anew wherever the torque itself jumps. All but `erk` work on the O(n) residual.
 enum class IntegratorMethod {
-  sdirk2,  ///< two stages, order 2
-  cash4,   ///< Cash's five stages, order 4, embedded order 3
-  sdirk4   ///< Hairer and Wanner's five stages, order 4, embedded order 3
+  sdirk2,       ///< ARKODE: two stages, order 2
+  cash4,        ///< ARKODE: Cash's five stages, order 4, embedded order 3
+  sdirk4,       ///< ARKODE: Hairer and Wanner's five stages, order 4, embedded order 3
+  erk,          ///< ARKODE: Dormand and Prince, explicit, order 5: for arms that are not stiff
+  cvode_bdf,    ///< CVODE: backward differences, order 1 to 5
+  cvode_adams,  ///< CVODE: Adams and Moulton, order 1 to 12: for arms that are not stiff
+  ida           ///< IDA: backward differences on r(t, x, v, v') = 0 itself, order 1 to 5
 };
 
 /// The absolute tolerance of u' (rad/s) over that of u (rad), in 1/s.
