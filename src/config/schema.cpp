@@ -205,6 +205,10 @@ void describe_control(SchemaVisitor& visitor, ControllerSettings& control, int s
   control.kd.resize(static_cast<std::size_t>(2 * segments), 0.0);
   visitor.numbers({"kd_nms_per_rad", "N m s/rad", "K_D, in the same forms", from_to(0.0, 1e3)},
                   gains, control.kd);
+  control.ki.resize(static_cast<std::size_t>(2 * segments), 0.0);
+  visitor.numbers({"ki_nm_per_rad_s", "N m/(rad s)",
+                   "integral gain on u, in the same forms; not in the paper", from_to(0.0, 1e4)},
+                  gains, control.ki);
   visitor.number(
       {"valve_lag_s", "s", "first-order lag inverted on what depends on the reference alone",
        from_to(0.0, 5.0)},

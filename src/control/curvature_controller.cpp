@@ -83,7 +83,11 @@ CurvatureController::CurvatureController(const ArmParameters& arm,
       settings_(settings),
       workspace_(arm),
       kp_(gains("kp", settings.kp, arm.dof())),
-      kd_(gains("kd", settings.kd, arm.dof())) {
+      kd_(gains("kd", settings.kd, arm.dof())),
+      ki_(settings.ki.empty() ? SegmentVector::Zero(arm.dof())
+                              : gains("ki", settings.ki, arm.dof())),
+      integral_(SegmentVector::Zero(arm.dof())),
+      integrates_(!ki_.isZero(0.0)) {
   if (!std::isfinite(settings.valve_lag_s) || settings.valve_lag_s < 0.0) {
     throw std::invalid_argument(
         fmt::format("control, valve_lag_s: expected a time >= 0, got {}", settings.valve_lag_s));
@@ -120,6 +124,7 @@ void CurvatureController::compute(ConstVectorRef u, ConstVectorRef velocity,
     feedback_polar(u, velocity, reference.now, out);
   }
   if (settings_.valve_lag_s > 0.0 && reference.interval_s > 0.0) add_lag_inverse(reference, out);
+  if (integrates_) out.tau_u_nm += integral_;
   solve_actuation(arm_, u, out.tau_u_nm, out.tau_actuation_nm);
   if (arm_.actuation == ActuationModel::couple) {
     for (Eigen::Index i = 0; i < u.size(); i += 2) {
@@ -176,6 +181,17 @@ void CurvatureController::feedback_polar(ConstVectorRef u, ConstVectorRef veloci
   inverse_dynamics(arm_, workspace_, u, velocity, velocity_ref_, acceleration_ref_, terms,
                    out.tau_u_nm);
   out.tau_u_nm += force;
+}
+
+void CurvatureController::integrate(double period_s, ConstVectorRef u,
+                                    const ReferenceSample& reference,
+                                    ConstVectorRef scale) noexcept {
+  if (!integrates_) return;
+  for (Eigen::Index i = 0; i < u.size(); ++i) {
+    const double growth = period_s * ki_[i] * (reference.u[i] - u[i]);
+    // Out of reach already: more of the same would only have to be undone later.
+    if (scale[i / 2] >= 1.0 || growth * integral_[i] < 0.0) integral_[i] += growth;
+  }
 }
 
 void CurvatureController::feed_forward(const ReferenceSample& r, SegmentVector& out) noexcept {

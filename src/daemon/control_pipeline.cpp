@@ -52,6 +52,7 @@ const TickOutput& ControlPipeline::tick(const TickInput& input) noexcept {
     // be noise.
     const SegmentVector at_rest = SegmentVector::Zero(settings_.arm.dof());
     reference_.start(seconds(act_ns), output_.motion.u_rad, at_rest);
+    controller_.reset_integral();
     ++activations_;
   }
   take_reference(input);
@@ -158,6 +159,7 @@ void ControlPipeline::take_reference(const TickInput& input) noexcept {
 void ControlPipeline::control() noexcept {
   controller_.compute(output_.motion.u_rad, output_.motion.velocity_radps, window_, control_);
   allocator_.allocate(control_.tau_actuation_nm, allocation_);
+  controller_.integrate(period_s_, output_.motion.u_rad, window_.now, allocation_.scale);
   output_.reference = window_.now;
   output_.reference_limited |= window_.now.limited;
   output_.tau_actuation_nm = control_.tau_actuation_nm;

@@ -41,6 +41,16 @@ class CurvatureController {
   void compute(ConstVectorRef u, ConstVectorRef velocity, const ReferenceWindow& reference,
                ControlOutput& out) noexcept;
 
+  /// Integral action, where K_I is not zero: what it holds grows by period_s K_I (u_ref - u) and is
+  /// added by compute() from then on. scale: n, the part of every segment's torque that the
+  /// chambers gave; where it is below 1 the segment only lets go of what it holds.
+  void integrate(double period_s, ConstVectorRef u, const ReferenceSample& reference,
+                 ConstVectorRef scale) noexcept;
+  /// Forgets what integrate() has gathered.
+  void reset_integral() noexcept { integral_.setZero(); }
+  /// What integral action holds, 2n, N m.
+  const SegmentVector& integral_nm() const noexcept { return integral_; }
+
  private:
   void feedback_u(ConstVectorRef u, ConstVectorRef velocity, const ReferenceSample& reference,
                   ControlOutput& out) noexcept;
@@ -54,6 +64,8 @@ class CurvatureController {
   DynamicsWorkspace workspace_;
   SegmentVector kp_, kd_, stiffness_, damping_;
   SegmentVector velocity_ref_, acceleration_ref_, before_, after_;
+  SegmentVector ki_, integral_;
+  bool integrates_;
 };
 
 }  // namespace softarm

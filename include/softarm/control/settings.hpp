@@ -40,6 +40,9 @@ struct ControllerSettings {
   /// theta].
   std::vector<double> kp;
   std::vector<double> kd;
+  /// Diagonal of an integral gain on u_ref - u (N m/(rad s)), in u whatever the coordinates; not in
+  /// the paper. Empty or zero: none, at no cost.
+  std::vector<double> ki;
   double valve_lag_s =
       0.0;  ///< first-order lag inverted on the part of (17) that depends on the reference alone
   double delay_s = 0.0;  ///< sensing and actuation dead time assumed by the load-time gain check
