@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "softarm/model/dynamics.hpp"
+#include "softarm/model/kinematics.hpp"
 
 namespace softarm {
 namespace {
@@ -20,24 +21,6 @@ struct Plane {
   Eigen::MatrixXd inverse_inertia, gravity_slope;
   Eigen::VectorXd stiffness, damping, kp, kd;
 };
-
-/// Slope of G about u = 0 by central differences.
-Eigen::MatrixXd gravity_slope(const ArmParameters& arm, DynamicsWorkspace& workspace) {
-  constexpr double kStep = 1e-4;
-  const int dof = arm.dof();
-  const DynamicsTerms gravity{false, false, true};
-  Eigen::MatrixXd slope(dof, dof);
-  Eigen::VectorXd u = Eigen::VectorXd::Zero(dof), zero = u, plus(dof), minus(dof);
-  for (int j = 0; j < dof; ++j) {
-    u[j] = kStep;
-    inverse_dynamics(arm, workspace, u, zero, zero, zero, gravity, plus);
-    u[j] = -kStep;
-    inverse_dynamics(arm, workspace, u, zero, zero, zero, gravity, minus);
-    u[j] = 0.0;
-    slope.col(j) = (plus - minus) / (2.0 * kStep);
-  }
-  return slope;
-}
 
 Plane plane_of(const ArmParameters& arm, const Eigen::MatrixXd& inertia,
                const Eigen::MatrixXd& slope, const Eigen::VectorXd& kp, const Eigen::VectorXd& kd,
@@ -131,7 +114,7 @@ struct Planes {
     Eigen::VectorXd G(dof);
     const Eigen::VectorXd zero = Eigen::VectorXd::Zero(dof);
     dynamics_matrices(arm, workspace, zero, zero, B, C, G);
-    const Eigen::MatrixXd slope = gravity_slope(arm, workspace);
+    const Eigen::MatrixXd slope = gravity_slope(arm, zero);
     for (int axis = 0; axis < 2; ++axis) plane[axis] = plane_of(arm, B, slope, kp, kd, axis);
   }
   Plane plane[2];
@@ -152,6 +135,41 @@ std::string explain(const Plane& plane, const ControllerSettings& settings, doub
 }
 
 }  // namespace
+
+Eigen::MatrixXd gravity_slope(const ArmParameters& arm, const Eigen::VectorXd& at) {
+  constexpr double kStep = 1e-4;
+  const int dof = arm.dof();
+  const DynamicsTerms gravity{false, false, true};
+  DynamicsWorkspace workspace(arm);
+  Eigen::MatrixXd slope(dof, dof);
+  Eigen::VectorXd u = at, zero = Eigen::VectorXd::Zero(dof), plus(dof), minus(dof);
+  for (int j = 0; j < dof; ++j) {
+    u[j] = at[j] + kStep;
+    inverse_dynamics(arm, workspace, u, zero, zero, zero, gravity, plus);
+    u[j] = at[j] - kStep;
+    inverse_dynamics(arm, workspace, u, zero, zero, zero, gravity, minus);
+    u[j] = at[j];
+    slope.col(j) = (plus - minus) / (2.0 * kStep);
+  }
+  return slope;
+}
+
+Eigen::Matrix3d tip_compliance(const ArmParameters& arm, const Eigen::VectorXd& u,
+                               const Eigen::VectorXd& kp_u, bool gravity_fed_back) {
+  const int dof = arm.dof();
+  if (u.size() != dof || kp_u.size() != dof) {
+    throw std::invalid_argument(fmt::format(
+        "tip compliance: expected u and K_P of {}, got {} and {}", dof, u.size(), kp_u.size()));
+  }
+  Eigen::MatrixXd stiffness = kp_u.asDiagonal();
+  for (int i = 0; i < dof; ++i) {
+    stiffness(i, i) += arm.segments[static_cast<std::size_t>(i / 2)].stiffness_nm_per_rad;
+  }
+  if (!gravity_fed_back) stiffness += gravity_slope(arm, u);
+  Eigen::MatrixXd J(3, dof);
+  tip_jacobian(arm, u, J);
+  return J * stiffness.lu().solve(J.transpose());
+}
 
 double largest_gain_factor(const ArmParameters& arm, const ControllerSettings& settings,
                            const Eigen::VectorXd& kp_u, const Eigen::VectorXd& kd_u) {

@@ -1,4 +1,4 @@
-// softarm bench model: every route to the model's terms, its time beside its error.
+// softarm bench: model is told here, the others beside.
 #include <cstdio>
 #include <filesystem>
 #include <memory>
@@ -43,6 +43,7 @@ void add_bench_command(CLI::App& app) {
   auto options = std::make_shared<BenchOptions>();
   CLI::App* group = app.add_subcommand("bench", "Measure how fast this machine is");
   group->require_subcommand(1);
+  add_bench_control_commands(*group);
   CLI::App* command = group->add_subcommand(
       "model", "Time and error of every route to the model's terms, for 1 to 100 segments");
   command->add_flag("--json", options->json, "print JSON instead of tables");

@@ -9,6 +9,9 @@ namespace softarm {
 /// softarm bench model [--json] [--seconds S] [--golden FILE]
 void add_bench_command(CLI::App& app);
 
+/// softarm bench control [--json] [CONFIG...], stability, softness: added to `softarm bench`
+void add_bench_control_commands(CLI::App& group);
+
 /// softarm check CONFIG | --template
 void add_check_command(CLI::App& app);
 

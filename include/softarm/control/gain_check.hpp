@@ -1,6 +1,7 @@
 // Do the configured gains leave the loop stable, given its delay and the valves' lag?
 #pragma once
 
+#include <Eigen/Core>
 #include <string>
 #include <vector>
 
@@ -22,6 +23,17 @@ namespace softarm {
 /// velocity filter are not in it unless delay_s counts them. A guide with a margin, not a proof.
 double largest_gain_factor(const ArmParameters& arm, const ControllerSettings& settings,
                            const Eigen::VectorXd& kp_u, const Eigen::VectorXd& kd_u);
+
+/// Slope of G at u (2n x 2n, N m/rad), by central differences. Not for the loop: allocates.
+Eigen::MatrixXd gravity_slope(const ArmParameters& arm, const Eigen::VectorXd& u);
+
+/// Compliance of the tip (m/N, world frame) against a small constant force on an arm at rest in u:
+///   J (K + K_P + G_u)^-1 J'.
+/// gravity_fed_back: the controller's G(u) takes G_u away, as (17) does; K_P = 0 and false is the
+/// passive arm under constant torques. kp_u: diagonal, 2n.
+/// @throws std::invalid_argument where sizes do not fit
+Eigen::Matrix3d tip_compliance(const ArmParameters& arm, const Eigen::VectorXd& u,
+                               const Eigen::VectorXd& kp_u, bool gravity_fed_back);
 
 /// Texts for a person, none if all is well: gains (in polar coordinates K_P,phi / theta^2 at
 /// `theta_rad`, the largest theta that the reference reaches) above what delay_s and valve_lag_s
