@@ -269,7 +269,7 @@ Kinematics kinematics(const ArmParameters& arm, const Vector& u, const Vector& v
 }
 
 Dynamics dynamics(const ArmParameters& arm, const Vector& u, const Vector& velocity,
-                  const std::vector<double>& radius_m, int extra_nodes) {
+                  int extra_nodes) {
   const int dof = arm.dof();
   const Vector3 gravity =
       arm.base_rotation.cast<Real>().transpose() * arm.gravity_mps2.cast<Real>();
@@ -290,7 +290,7 @@ Dynamics dynamics(const ArmParameters& arm, const Vector& u, const Vector& veloc
     const Quadrature& rule = gauss_legendre(nodes_for(std::hypot(s.ux.v, s.uy.v)) + extra_nodes);
     for (std::size_t k = 0; k < rule.node.size(); ++k) {
       masses.node(m, mass * rule.weight[k], length, rule.node[k],
-                  radius_m.empty() ? 0 : static_cast<Real>(radius_m[m]));
+                  static_cast<Real>(arm.segments[m].radius_m));
     }
   }
   for (int i = 0; i < dof; ++i) {

@@ -53,11 +53,9 @@ struct Dynamics {
 
 /// B, C, G and the energies in u.
 /// @param velocity 2n, the one C and the kinetic energy are for.
-/// @param radius_m of the cross-section, one a segment; empty or 0: no rotary inertia. Only read
-/// with distributed mass.
 /// @param extra_nodes more than the rule needs, to see that it needs no more.
 Dynamics dynamics(const ArmParameters& arm, const Vector& u, const Vector& velocity,
-                  const std::vector<double>& radius_m = {}, int extra_nodes = 0);
+                  int extra_nodes = 0);
 
 /// B x + C b + G with C of the velocity that `terms` were evaluated for.
 Vector inverse_dynamics(const Dynamics& terms, const Vector& b, const Vector& x);

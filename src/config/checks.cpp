@@ -30,6 +30,8 @@ class Checks {
   void run() const {
     check_arm("arm", experiment_.arm);
     check_arm("plant.arm", experiment_.plant.arm);
+    check_radius("arm", experiment_.arm, false);
+    check_radius("plant.arm", experiment_.plant.arm, experiment_.plant.kind == PlantKind::links);
     check_actuation("actuation", experiment_.actuation);
     check_actuation("plant.actuation", experiment_.plant.actuation);
     check_same_chambers();
@@ -55,6 +57,15 @@ class Checks {
         deviation < kRotationTolerance && determinant > 0.0, key + ".base.rotation",
         "a rotation: orthonormal, determinant +1",
         fmt::format("R'R off the identity by {:.2g}, determinant {:.6g}", deviation, determinant));
+  }
+
+  /// Rotary inertia needs a cross-section that the model has.
+  void check_radius(const std::string& key, const ArmParameters& arm, bool links) const {
+    const auto thick = [](const SegmentParameters& segment) { return segment.radius_m > 0.0; };
+    const bool asked = std::any_of(arm.segments.begin(), arm.segments.end(), thick);
+    require(!asked || (arm.mass == MassModel::distributed && !links), key + ".radius_m",
+            "0 where mass is in points or the arm is made of links: they have no cross-section",
+            "a radius");
   }
 
   void check_actuation(const std::string& key, const ActuationSettings& actuation) const {

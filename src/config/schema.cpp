@@ -102,6 +102,11 @@ void describe_arm(SchemaVisitor& visitor, ArmParameters& arm) {
               {"damping_nms_per_rad", "N m s/rad", "bending damping beta of (14)",
                from_to(0.0, 1e3), presence},
               arm, &SegmentParameters::damping_nms_per_rad);
+  per_segment(visitor,
+              {"radius_m", "m",
+               "of the round cross-section, for its rotary inertia; 0: left out, as in the paper",
+               from_to(0.0, 1.0)},
+              arm, &SegmentParameters::radius_m);
   visitor.choice({"mass_model", "",
                   "point: the paper's masses at the centres of mass; distributed: along the arc"},
                  kMassModels, arm.mass);

@@ -15,6 +15,7 @@
 
 #include "model/dynamics_storage.hpp"
 #include "softarm/model/dynamics.hpp"
+#include "softarm/model/polar.hpp"
 
 namespace softarm {
 namespace {
@@ -270,6 +271,28 @@ SegmentColumns* outward(const ArmParameters& arm, DynamicsWorkspace& workspace,
   return segments;
 }
 
+/// A thick arm's columns come from the recursion, which knows rotary inertia: B e_j and C(u, u')
+/// e_j.
+void columns_of_recursion(const ArmParameters& arm, DynamicsWorkspace& workspace, ConstVectorRef u,
+                          ConstVectorRef velocity, Eigen::Ref<Eigen::MatrixXd> B,
+                          Eigen::Ref<Eigen::MatrixXd>* C) noexcept {
+  auto& s = workspace.storage();
+  s.rhs.setZero();
+  for (Eigen::Index j = 0; j < u.size(); ++j) {
+    s.rhs(j) = 1.0;
+    inverse_dynamics(arm, workspace, u, s.zeros, s.zeros, s.rhs,
+                     {.inertia = true, .coriolis = false, .gravity = false}, s.solution);
+    // One triangle decides both: B is symmetric to the last bit.
+    for (Eigen::Index i = 0; i <= j; ++i) B(i, j) = B(j, i) = s.solution(i);
+    if (C != nullptr) {
+      inverse_dynamics(arm, workspace, u, velocity, s.rhs, s.zeros,
+                       {.inertia = false, .coriolis = true, .gravity = false}, s.solution);
+      C->col(j) = s.solution.head(u.size());
+    }
+    s.rhs(j) = 0.0;
+  }
+}
+
 }  // namespace
 
 void dynamics_matrices(const ArmParameters& arm, DynamicsWorkspace& workspace, ConstVectorRef u,
@@ -278,12 +301,20 @@ void dynamics_matrices(const ArmParameters& arm, DynamicsWorkspace& workspace, C
   const auto* segments = outward<false>(arm, workspace, {u.data(), velocity.data()});
   inward<true>(arm.size(), segments, {B.data(), B.outerStride()}, {C.data(), C.outerStride()},
                G.data());
+  if (arm.is_thick()) columns_of_recursion(arm, workspace, u, velocity, B, &C);
 }
 
 void polar_dynamics_matrices(const ArmParameters& arm, DynamicsWorkspace& workspace,
                              ConstVectorRef q, ConstVectorRef velocity,
                              Eigen::Ref<Eigen::MatrixXd> B, Eigen::Ref<Eigen::MatrixXd> C,
                              VectorRef G) noexcept {
+  if (arm.is_thick()) {
+    auto& s = workspace.storage();
+    polar_to_u(q, s.residual);
+    polar_velocity_to_u(q, velocity, s.bias);
+    dynamics_matrices(arm, workspace, s.residual, s.bias, B, C, G);
+    return dynamics_to_polar(q, velocity, B, C, G);
+  }
   const auto* segments = outward<true>(arm, workspace, {q.data(), velocity.data()});
   inward<true>(arm.size(), segments, {B.data(), B.outerStride()}, {C.data(), C.outerStride()},
                G.data());
@@ -292,6 +323,7 @@ void polar_dynamics_matrices(const ArmParameters& arm, DynamicsWorkspace& worksp
 void inertia_matrix(const ArmParameters& arm, DynamicsWorkspace& workspace, ConstVectorRef u,
                     Eigen::Ref<Eigen::MatrixXd> B) noexcept {
   auto& s = workspace.storage();
+  if (arm.is_thick()) return columns_of_recursion(arm, workspace, u, s.zeros, B, nullptr);
   const auto* segments = outward<false>(arm, workspace, {u.data(), s.zeros.data()});
   inward<false>(arm.size(), segments, {B.data(), B.outerStride()}, {nullptr, 0}, s.residual.data());
 }

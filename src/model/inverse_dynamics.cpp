@@ -11,6 +11,7 @@
 #include <type_traits>
 
 #include "model/dynamics_storage.hpp"
+#include "model/rotary_inertia.hpp"
 #include "softarm/model/dynamics.hpp"
 
 namespace softarm {
@@ -173,6 +174,26 @@ inline void arc_forces(const SegmentLanes& k, int l, const Vector3& weight, cons
   set_torque(ux, uy, on_p.x, on_p.y, stretch, out);
 }
 
+/// A thick cross-section of radius r turns with the arc.
+template <bool kInertia, bool kCoriolis>
+void add_rotary_inertia(const SegmentParameters& segment, const Inputs& in, int i,
+                        const SegmentLanes& k, const FrameMotion& m, SegmentForces& out) noexcept {
+  const int l = i % kLanes;
+  const double r = segment.radius_m;
+  DiscMotion motion{m.spin_a, m.spin_b, m.angular, k.ux[l], k.uy[l], {}, {}, {}};
+  if constexpr (kCoriolis) {
+    motion.a = lane(k.a, l);
+    motion.b = lane(k.b, l);
+  }
+  if constexpr (kInertia) {
+    motion.x = direction(motion.ux, motion.uy, in.x[2 * i], in.x[2 * i + 1]);
+  }
+  const DiscForces discs = disc_forces(0.25 * segment.mass_kg * r * r, motion);
+  out.moment += discs.moment;
+  out.torque_x += discs.torque_x;
+  out.torque_y += discs.torque_y;
+}
+
 template <MassModel kMass, class Frame>
 inline void own_forces(const SegmentLanes& k, int l, const Vector3& base, const Frame& f,
                        SegmentForces& out) noexcept {
@@ -209,6 +230,14 @@ void outward(const ArmParameters& arm, const Inputs& in, Vector3 base, SegmentLa
              SegmentForces* out) noexcept {
   const int n = arm.size();
   FrameMotion m{{0, 0, 0}, {0, 0, 0}, {0, 0, 0}, base};
+  const auto add_thickness = [&](int i, const SegmentLanes& k) {
+    if constexpr (kMass == MassModel::distributed) {
+      const SegmentParameters& segment = arm.segments[static_cast<std::size_t>(i)];
+      if (segment.radius_m > 0.0) {
+        add_rotary_inertia<kInertia, kCoriolis>(segment, in, i, k, m, out[i]);
+      }
+    }
+  };
   for (int i = 0; i < n; ++i) {
     SegmentLanes& k = lanes[i / kLanes];
     const int l = i % kLanes;
@@ -220,10 +249,12 @@ void outward(const ArmParameters& arm, const Inputs& in, Vector3 base, SegmentLa
       if (!last) m.linear = rotate_back(turn(k, l), m.linear);
     } else if (i == 0) {
       own_forces<kMass>(k, l, m.linear, StillFrame{}, out[i]);
+      add_thickness(i, k);
       if (!last) advance<kCoriolis>(k, l, StillFrame{}, m);
     } else {
       const FrameAcceleration f = frame_acceleration<kCoriolis>(m, k, l);
       own_forces<kMass>(k, l, m.linear, f, out[i]);
+      add_thickness(i, k);
       if (!last) advance<kCoriolis>(k, l, f, m);
     }
   }

@@ -52,6 +52,8 @@ const PlantSettings& checked(const PlantSettings& settings) {
            std::to_string(segment.mass_kg));
     expect(std::isfinite(segment.stiffness_nm_per_rad) && segment.stiffness_nm_per_rad >= 0.0,
            "stiffnesses >= 0 N m/rad", std::to_string(segment.stiffness_nm_per_rad));
+    expect(std::isfinite(segment.radius_m) && segment.radius_m >= 0.0, "radii >= 0 m",
+           std::to_string(segment.radius_m));
     expect(std::isfinite(segment.damping_nms_per_rad) && segment.damping_nms_per_rad >= 0.0,
            "damping >= 0 N m s/rad", std::to_string(segment.damping_nms_per_rad));
   }

@@ -61,7 +61,8 @@ ArmParameters pieces_of(const PlantSettings& settings) {
       arm.segments.push_back({.length_m = segment.length_m * length[j],
                               .mass_kg = segment.mass_kg * mass[j],
                               .stiffness_nm_per_rad = segment.stiffness_nm_per_rad * stiffer,
-                              .damping_nms_per_rad = segment.damping_nms_per_rad * stiffer});
+                              .damping_nms_per_rad = segment.damping_nms_per_rad * stiffer,
+                              .radius_m = segment.radius_m});
     }
   }
   return arm;

@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <vector>
 
 namespace softarm {
@@ -24,6 +25,9 @@ struct SegmentParameters {
   double mass_kg = 0.15;
   double stiffness_nm_per_rad = 0.626;  ///< k of (14)
   double damping_nms_per_rad = 0.029;   ///< beta of (14)
+  /// Of the round cross-section, whose rotary inertia mu r^2/4 a unit of arc the paper leaves out;
+  /// 0 leaves it out too and costs nothing. Distributed mass only: a point has no cross-section.
+  double radius_m = 0.0;
 };
 
 /// Where a segment's mass sits. `point` is the paper's (all of it at the centre of mass, no
@@ -46,6 +50,12 @@ struct ArmParameters {
   Eigen::Vector3d base_position_m = Eigen::Vector3d::Zero();
   Eigen::Vector3d gravity_mps2 = Eigen::Vector3d(0.0, 0.0, -9.81);  ///< in the world frame
 
+  /// Does a cross-section have rotary inertia?
+  bool is_thick() const {
+    return mass == MassModel::distributed &&
+           std::any_of(segments.begin(), segments.end(),
+                       [](const SegmentParameters& segment) { return segment.radius_m > 0.0; });
+  }
   int size() const { return static_cast<int>(segments.size()); }
   int dof() const { return 2 * size(); }
 };

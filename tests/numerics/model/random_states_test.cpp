@@ -48,6 +48,17 @@ TEST_P(RandomStates, AgreeWithLongDouble) {
   EXPECT_GE(2 * states, 100000);
 }
 
+TEST(ThickArms, AgreeWithLongDouble) {
+  RandomArm random(7);
+  for (int k = 0; k < 2000; ++k) {
+    const int n = 1 + k % 6;
+    const double theta = k % 2 == 0 ? 7.0 : 1.6;
+    const ArmParameters arm = random.thick(random.arm(n, MassModel::distributed));
+    expect_within(AgainstReference(arm, random.state(n, theta)), n, theta);
+    if (HasFailure()) FAIL() << n << " segments, state " << k;
+  }
+}
+
 TEST_P(RandomStates, AgreeForRatiosOfAMillion) {
   RandomArm random(3);
   for (const int n : {2, 3, 5, 8, 16, 40, 64}) {

@@ -67,6 +67,11 @@ void expect_golden(const golden::Case& c, const golden::Terms& want, MassModel m
   }
 }
 
+ArmParameters thick(ArmParameters arm, const std::vector<double>& radius_m) {
+  for (std::size_t m = 0; m < radius_m.size(); ++m) arm.segments[m].radius_m = radius_m[m];
+  return arm;
+}
+
 TEST(ReferenceModel, GivesTheGoldenNumbersToTheLastPlace) {
   int distributed = 0;
   for (const golden::Case& c : golden::cases()) {
@@ -110,8 +115,8 @@ TEST(ReferenceModel, MoreNodesChangeNothing) {
     s.u << theta * 0.6, theta * 0.8, -theta, 0.0;
     const Vector u = s.u.cast<Real>(), v = s.v.cast<Real>();
     const std::vector<double> radius{0.02, 0.05};
-    const Dynamics a = reference::dynamics(arm, u, v, radius),
-                   b = reference::dynamics(arm, u, v, radius, 9);
+    const Dynamics a = reference::dynamics(thick(arm, radius), u, v),
+                   b = reference::dynamics(thick(arm, radius), u, v, 9);
     const Matrix inertia = a.s * a.s.transpose(), coriolis = a.s * a.r.transpose();
     EXPECT_LE(largest((a.B - b.B).cwiseQuotient(inertia)), 1e-17L) << theta;
     EXPECT_LE(largest((a.C - b.C).cwiseQuotient(coriolis)), 1e-17L) << theta;
@@ -122,7 +127,9 @@ TEST(ReferenceModel, MoreNodesChangeNothing) {
 Matrix slope(const ArmParameters& arm, const Vector& u, const Vector& e,
              const std::vector<double>& radius) {
   const Real h = 1e-4L;
-  const auto B = [&](Real step) { return reference::dynamics(arm, u + step * e, e, radius).B; };
+  const auto B = [&](Real step) {
+    return reference::dynamics(thick(arm, radius), u + step * e, e).B;
+  };
   return (8 * (B(h) - B(-h)) - (B(2 * h) - B(-2 * h))) / (12 * h);
 }
 
@@ -136,7 +143,7 @@ TEST(ReferenceModel, CoriolisMatrixIsChristoffelOfTheInertia) {
          {std::vector<double>{}, std::vector<double>{0.03, 0.06}}) {
       std::vector<Matrix> dB;
       for (int k = 0; k < 4; ++k) dB.push_back(slope(arm, u, Vector::Unit(4, k), radius));
-      const Dynamics got = reference::dynamics(arm, u, v, radius);
+      const Dynamics got = reference::dynamics(thick(arm, radius), u, v);
       for (int i = 0; i < 4; ++i) {
         for (int j = 0; j < 4; ++j) {
           Real want = 0;
@@ -180,7 +187,7 @@ TEST(ReferenceModel, RingsOfPointsAreThinDiscs) {
           mass * Real(radius[m]) * Real(radius[m]) / 4 * J.transpose() * disc * J;
     }
   }
-  const Matrix got = reference::dynamics(arm, u, v, radius).B;
+  const Matrix got = reference::dynamics(thick(arm, radius), u, v).B;
   EXPECT_LE(largest(got - want), 1e-17L * largest(want));
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <random>
 
 #include "softarm/model/arm.hpp"
@@ -40,6 +41,13 @@ class RandomArm {
     result.base_position_m = vector(3, 0.5);
     result.gravity_mps2 = Eigen::Vector3d(vector(3, 2.0)) - Eigen::Vector3d(0, 0, 9.81);
     return result;
+  }
+  /// Cross-sections of up to half a segment's length, every third one thin.
+  ArmParameters thick(ArmParameters arm) {
+    for (SegmentParameters& segment : arm.segments) {
+      segment.radius_m = std::max(0.0, uniform(-0.25, 0.5)) * segment.length_m;
+    }
+    return arm;
   }
   /// theta up to `theta` a segment, any phi.
   Eigen::VectorXd bending(int segments, double theta) {
