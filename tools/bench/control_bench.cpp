@@ -137,7 +137,7 @@ StabilityMap bench_stability(const Experiment& configured, StabilityAxis axis, i
                              const BenchProgress& progress) {
   Experiment experiment = configured;
   std::fill(experiment.control.kd.begin(), experiment.control.kd.end(), 0.0);
-  constexpr double kLargestGain = 6.0, kLongestDead_s = 0.03, kLongestLag_s = 0.06;
+  constexpr double kLargestGain = 4.0, kLongestDead_s = 0.03, kLongestLag_s = 0.06;
   const bool dead = axis == StabilityAxis::dead_time;
   StabilityMap map;
   map.axis = dead ? "dead time [s]" : "valve lag [s]";

@@ -63,7 +63,7 @@ def at_least(axes, span):
         axes.set_ylim(middle - span / 2, middle + span / 2)
 
 
-def finish(figure, path, title, handles=(), row_gap=0.22, left_margin=0.72):
+def finish(figure, path, title, handles=(), row_gap=0.22, left_margin=0.72, column_gap=0.85):
     """Title on the left, legend right of it in the same line, everything in its place (inches), saved."""
     width, height = figure.get_size_inches()
     # Margins and gaps have a fixed size on paper, whatever the figure's; tight_layout would take as long as drawing.
@@ -71,8 +71,9 @@ def finish(figure, path, title, handles=(), row_gap=0.22, left_margin=0.72):
     titled = any(axes.get_title(loc="left") for axes in figure.axes)
     top, bottom, left, right = 0.72 if titled else 0.55, 0.48, left_margin, 0.15
     row = (height - top - bottom - row_gap * (rows - 1)) / rows
-    column = (width - left - right - 0.85 * (columns - 1)) / columns
-    figure.subplots_adjust(left / width, bottom / height, 1 - right / width, 1 - top / height, 0.85 / column, row_gap / row)
+    column = (width - left - right - column_gap * (columns - 1)) / columns
+    figure.subplots_adjust(left / width, bottom / height, 1 - right / width, 1 - top / height, column_gap / column,
+                           row_gap / row)
     figure.text(0.012, 1 - 0.12 / height, title, fontsize=11.5, fontweight="bold", va="top", ha="left")
     if handles:
         figure.legend(handles=list(handles), loc="upper right", ncol=len(handles), handlelength=1.8,

@@ -1,0 +1,153 @@
+// What linear theory says of stability and of softness, against simulated arms.
+#include "bench/sampled_loop.hpp"
+
+#include <gtest/gtest.h>
+#include <yaml-cpp/yaml.h>
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+
+#include "bench/control_bench.hpp"
+#include "bench/control_trials.hpp"
+#include "softarm/config/load.hpp"
+#include "softarm/control/gain_check.hpp"
+#include "softarm/model/dynamics.hpp"
+
+namespace softarm {
+namespace {
+
+using Eigen::VectorXd;
+
+Experiment configured(const char* name) {
+  return load_experiment(std::string(SOFTARM_SOURCE_DIR "/config/") + name);
+}
+
+Experiment with_gains(Experiment experiment, double kp, double kd = 0.0) {
+  std::fill(experiment.control.kp.begin(), experiment.control.kp.end(), kp);
+  std::fill(experiment.control.kd.begin(), experiment.control.kd.end(), kd);
+  return experiment;
+}
+
+VectorXd straight(const Experiment& experiment) { return VectorXd::Zero(experiment.arm.dof()); }
+
+TEST(SampledLoop, TheoryAndSimulationLoseStabilityTogether) {
+  struct Case {
+    double lag_s, dead_time_s, rate_hz;
+  };
+  for (const Case& each : {Case{0.02, 0.0, 500.0}, {0.02, 0.01, 500.0}, {0.05, 0.0, 100.0}}) {
+    Experiment experiment = with_gains(configured("paper_arm.yaml"), 1.0);
+    experiment.plant.valves.lag_s = experiment.control.valve_lag_s = each.lag_s;
+    experiment.plant.valves.dead_time_s = each.dead_time_s;
+    experiment.daemon.rate_hz = each.rate_hz;
+    const double limit = largest_sampled_factor(experiment, straight(experiment));
+    EXPECT_GT(limit, 0.3);
+    EXPECT_LT(limit, 6.0);
+    // Within 5 % on either side: the arm is not linear, and fading is seen for three seconds only.
+    EXPECT_TRUE(kick(with_gains(experiment, 0.95 * limit)).stable) << limit << " " << each.lag_s;
+    EXPECT_FALSE(kick(with_gains(experiment, 1.05 * limit)).stable) << limit << " " << each.lag_s;
+  }
+}
+
+TEST(SampledLoop, GrowthIsThatOfASimulatedBlow) {
+  const Experiment base = with_gains(configured("paper_arm.yaml"), 1.0);
+  const double limit = largest_sampled_factor(base, straight(base));
+  for (const double share : {0.9, 1.05}) {
+    const Experiment experiment = with_gains(base, share * limit);
+    EXPECT_NEAR(kick(experiment).growth_1ps, loop_growth_1ps(experiment, straight(experiment)),
+                0.15)
+        << share * limit;
+  }
+}
+
+TEST(SampledLoop, FastSamplingIsTheContinuousTheory) {
+  Experiment experiment = with_gains(configured("paper_arm_nominal.yaml"), 1.0);
+  experiment.plant.valves.lag_s = experiment.control.valve_lag_s = 0.02;
+  experiment.plant.valves.dead_time_s = 0.008;
+  experiment.daemon.rate_hz = experiment.plant.mocap.rate_hz = 4000.0;
+  experiment.estimation.filter_bandwidth_radps = 3000.0;
+  experiment.control.delay_s = 0.008;
+  const VectorXd ones = VectorXd::Ones(experiment.arm.dof());
+  const double continuous =
+      largest_gain_factor(experiment.arm, experiment.control, ones, 0.0 * ones);
+  EXPECT_NEAR(largest_sampled_factor(experiment, straight(experiment)), continuous,
+              0.02 * continuous);
+}
+
+TEST(SampledLoop, WithoutFeedbackTheArmDecaysByItself) {
+  Experiment experiment = with_gains(configured("paper_arm.yaml"), 0.0);
+  experiment.control.terms.gravity = false;
+  // The slowest mode of B s^2 + D s + K + G_u.
+  const Eigen::Index dof = experiment.arm.dof();
+  DynamicsWorkspace workspace(experiment.arm);
+  Eigen::MatrixXd B(dof, dof), C(dof, dof), A = Eigen::MatrixXd::Zero(2 * dof, 2 * dof);
+  VectorXd G(dof);
+  const VectorXd zero = straight(experiment);
+  dynamics_matrices(experiment.arm, workspace, zero, zero, B, C, G);
+  const SegmentParameters& segment = experiment.arm.segments[0];  // all are alike
+  const Eigen::MatrixXd one = Eigen::MatrixXd::Identity(dof, dof);
+  const Eigen::MatrixXd stiffness =
+      gravity_slope(experiment.arm, zero) + segment.stiffness_nm_per_rad * one;
+  A.topRightCorner(dof, dof) = one;
+  A.bottomLeftCorner(dof, dof) = -B.inverse() * stiffness;
+  A.bottomRightCorner(dof, dof) = -segment.damping_nms_per_rad * B.inverse();
+  const double slowest = A.eigenvalues().real().maxCoeff();
+  EXPECT_LT(slowest, -1.0);
+  // Windows of whole frames, not of whole oscillations: 2 %.
+  EXPECT_NEAR(loop_growth_1ps(experiment, zero), slowest, 0.02 * std::abs(slowest));
+}
+
+TEST(TipCompliance, IsWhatASimulatedPushFinds) {
+  Experiment experiment = configured("paper_arm_nominal.yaml");
+  const VectorXd rest = straight(experiment);
+  experiment.reference.phases = {{SetPointReference{std::vector<double>(6, 0.0)}, 0.0}};
+  for (const double kp : {0.0, 2.0}) {
+    const double predicted =
+        tip_compliance(experiment.arm, rest, VectorXd::Constant(6, kp), true)(0, 0);
+    EXPECT_NEAR(measured_tip_compliance(with_gains(experiment, kp), 0.02), predicted,
+                0.01 * predicted)
+        << kp;
+  }
+  // Passive, gravity helps to keep it straight.
+  experiment = with_gains(experiment, 0.0);
+  experiment.control.terms = {false, false, false, false, false};
+  const double passive = tip_compliance(experiment.arm, rest, VectorXd::Zero(6), false)(0, 0);
+  EXPECT_LT(passive, tip_compliance(experiment.arm, rest, VectorXd::Zero(6), true)(0, 0));
+  EXPECT_NEAR(measured_tip_compliance(experiment, 0.02), passive, 0.01 * passive);
+}
+
+TEST(TipCompliance, IsSymmetricAndRefusesWhatDoesNotFit) {
+  const Experiment experiment = configured("paper_arm.yaml");
+  const VectorXd u = VectorXd::LinSpaced(6, -0.6, 0.9);
+  const Eigen::Matrix3d compliance = tip_compliance(experiment.arm, u, VectorXd::Ones(6), false);
+  EXPECT_LT((compliance - compliance.transpose()).norm(), 1e-9 * compliance.norm());
+  EXPECT_THROW(tip_compliance(experiment.arm, u.head(4), VectorXd::Ones(6), false),
+               std::invalid_argument);
+}
+
+TEST(IntegralGain, MakesTheTipGiveWayNoMoreAndTracksUnderAWrongModel) {
+  Experiment experiment = configured("paper_arm_nominal.yaml");
+  experiment.reference.phases = {{SetPointReference{std::vector<double>(6, 0.0)}, 0.0}};
+  const double without = measured_tip_compliance(experiment, 0.02);
+  experiment.control.ki.assign(6, 5.0);
+  EXPECT_LT(std::abs(measured_tip_compliance(experiment, 0.02)), 0.02 * without);
+}
+
+TEST(ControlBench, TellsWellFormedJson) {
+  Experiment experiment = configured("paper_arm.yaml");
+  experiment.run.tracking_from_s = 0.2;
+  const ControlScene scene = bench_scene(experiment, 1.0, 0.02, [](const std::string&) {});
+  const YAML::Node root = YAML::Load(json(std::vector<ControlScene>{scene}));
+  ASSERT_EQ(root["scenes"].size(), 1u);
+  EXPECT_EQ(root["scenes"][0]["rates"].size(), 6u);
+  ASSERT_EQ(root["scenes"][0]["terms"].size(), 7u);
+  for (const auto& row : root["scenes"][0]["terms"]) {
+    EXPECT_GT(row["controller_ns"].as<double>(), 0.0);
+    EXPECT_GT(row["u_rms_rad"].as<double>(), 0.0);
+    EXPECT_TRUE(row["stayed_active"].as<bool>());
+  }
+  EXPECT_FALSE(table({scene}).empty());
+}
+
+}  // namespace
+}  // namespace softarm
