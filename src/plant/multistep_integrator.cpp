@@ -201,6 +201,7 @@ IdaIntegrator::IdaIntegrator(SecondOrderSystem& system, const IntegratorSettings
   check(IDASetNonlinearSolver(ida_, solver_), "IDASetNonlinearSolver");
   check(IDASetMaxNumSteps(ida_, kMaxSteps), "IDASetMaxNumSteps");
   check(IDASetMaxErrTestFails(ida_, kMaxErrorTestFailures), "IDASetMaxErrTestFails");
+  check(IDASetMinStep(ida_, kMinStep_s), "IDASetMinStep");
 }
 
 IdaIntegrator::~IdaIntegrator() { IDAFree(&ida_); }

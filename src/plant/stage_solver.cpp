@@ -31,13 +31,13 @@ void StageSolver::factorize(double gamma_s) {
   lu_.compute(matrix_);
   gamma_s_ = gamma_s;
   rate_ = 1.0;
-  rate_seen_ = false;
 }
 
 void StageSolver::linearize(const Stage& stage) {
   system_.linearize(stage.t_s, x_, v_, a_, by_a_, by_v_, by_x_);
   linearized_ = true;
   age_ = 0;
+  wasted_ = 0;
   ++linearizations_;
   factorize(stage.gamma_s);
 }
@@ -59,7 +59,6 @@ StageSolver::Outcome StageSolver::iterate(const Stage& stage) {
       return Outcome::failed;
     }
     if (iteration > 0) {
-      rate_seen_ = true;
       rate_ = std::max(0.3 * rate_, previous > 0.0 ? norm / previous : 0.0);
     }
     if (norm * std::min(1.0, rate_) <= stage.tolerance) {
@@ -83,10 +82,13 @@ bool StageSolver::solve(const Stage& stage) {
     factorize(stage.gamma_s);
   }
   ++age_;
+  const std::int64_t before = iterations_;
   Outcome outcome = iterate(stage);
   if (outcome == Outcome::converged) {
-    // A matrix that has become this poor costs more iterations than a new one.
-    linearized_ = !(rate_seen_ && rate_ > 0.3 && age_ >= 8);
+    // A new matrix costs about as much as two residuals a coordinate; a good one needs two
+    // iterations a stage. Where the old one has wasted as much, it goes.
+    wasted_ += std::max<std::int64_t>(0, iterations_ - before - 2);
+    linearized_ = wasted_ < 2 * a_.size();
     return true;
   }
   if (!fresh) {

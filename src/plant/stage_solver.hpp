@@ -70,9 +70,9 @@ class StageSolver {
   Eigen::PartialPivLU<Eigen::MatrixXd> lu_;
   double gamma_s_ = 0.0;  // that the factorization is for
   double rate_ = 1.0;     // of convergence, as last seen
-  bool rate_seen_ = false;
   bool linearized_ = false;
   int age_ = 0;
+  std::int64_t wasted_ = 0;  // iterations since the linearization that a better one had saved
   std::int64_t iterations_ = 0;
   std::int64_t linearizations_ = 0;
 };

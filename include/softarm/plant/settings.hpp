@@ -96,7 +96,7 @@ struct BaseMotion {
 /// (stiffly accurate, no explicit first stage): a sampled command costs them nothing. The multistep
 /// methods start anew wherever the torque itself jumps. All but `erk` work on the O(n) residual.
 enum class IntegratorMethod {
-  sdirk2,       ///< ARKODE: two stages, order 2
+  sdirk2,       ///< ARKODE: Alexander's two stages, order 2
   cash4,        ///< ARKODE: Cash's five stages, order 4, embedded order 3
   sdirk4,       ///< ARKODE: Hairer and Wanner's five stages, order 4, embedded order 3
   erk,          ///< ARKODE: Dormand and Prince, explicit, order 5: for arms that are not stiff
