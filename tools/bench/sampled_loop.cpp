@@ -205,19 +205,24 @@ double loop_growth_1ps(const Experiment& experiment, const VectorXd& u_rad) {
     throw std::invalid_argument(
         fmt::format("loop: expected {} numbers, got {}", experiment.arm.dof(), u_rad.size()));
   }
-  // Short windows, so that not even a violent instability overflows in one.
-  constexpr int kSettling = 12, kMeasured = 12;
+  // Short windows, so that not even a violent instability overflows in one; many, so that it does
+  // not matter which part of an oscillation falls into one: the slope of a line through all.
+  constexpr int kSettling = 12, kMeasured = 40;
   constexpr double kWindow_s = 0.25;
   Loop loop(experiment, u_rad);
-  double growth = 0.0;
+  double grown = 0.0, slope = 0.0, weight = 0.0;
   double before = loop.run(kWindow_s);
   for (int k = 0; k < kSettling + kMeasured; ++k) {
     loop.scale(1.0 / before);
     before = loop.run(kWindow_s);
     if (!std::isfinite(before)) return std::numeric_limits<double>::infinity();
-    if (k >= kSettling) growth += std::log(before) / (kMeasured * kWindow_s);
+    if (k < kSettling) continue;
+    grown += std::log(before);
+    const double at = k - kSettling - 0.5 * (kMeasured - 1);
+    slope += at * grown;
+    weight += at * at;
   }
-  return growth;
+  return slope / (weight * kWindow_s);
 }
 
 double largest_sampled_factor(const Experiment& experiment, const VectorXd& u_rad, double upper) {
