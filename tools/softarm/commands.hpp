@@ -12,6 +12,9 @@ void add_bench_command(CLI::App& app);
 /// softarm bench control [--json] [CONFIG...], stability, softness: added to `softarm bench`
 void add_bench_control_commands(CLI::App& group);
 
+/// softarm bench plant [--json] [--duration S] [--rounds N]: added to `softarm bench`
+void add_bench_plant_command(CLI::App& group);
+
 /// softarm check CONFIG | --template
 void add_check_command(CLI::App& app);
 
