@@ -5,7 +5,8 @@ from matplotlib.lines import Line2D
 from .style import CATEGORY, ESTIMATE, INK, finish, plt
 
 THEORY_STYLE = {"color": INK, "linestyle": (0, (4, 2)), "linewidth": 1.0}
-LAW_COLOUR = {"(17)": CATEGORY[0], "statics and PI": CATEGORY[4], "PI alone": CATEGORY[1], "K_P and K_D alone": CATEGORY[1]}
+LAW_COLOUR = {"(17)": CATEGORY[0], "statics and PI": CATEGORY[4], "PI alone": CATEGORY[1],
+              "(17) and K_I 1": CATEGORY[3], "K_P and K_D alone": CATEGORY[1]}
 
 
 def _kept(rows, key="u_rms_rad"):
@@ -38,13 +39,16 @@ def _softness(axes, rows):
 def _speed(axes, rows):
     for law in dict.fromkeys(row["law"] for row in rows):
         mine = [row for row in rows if row["law"] == law]
-        axes.plot([row["rate_radps"] for row in mine], _kept(mine), "o-", markersize=4, color=LAW_COLOUR[law], label=law)
+        name, off, _ = law.partition(", 5 % off")
+        axes.plot([row["rate_radps"] for row in mine], _kept(mine), "o:" if off else "o-", markersize=4,
+                  color=LAW_COLOUR[name], label=None if off and name != "(17) and K_I 1" else name)
     axes.set_yscale("log")
     axes.set_ylim(bottom=1)
     axes.set_xlabel("rate of (24) [rad/s]")
     axes.set_ylabel("tracking error [mrad rms]")
-    axes.set_title("a dynamic model is needed")
-    axes.legend()
+    axes.set_title("a dynamic model is needed (dotted: parameters 5 % off)")
+    axes.legend(loc="upper left", ncol=2, bbox_to_anchor=(0, 1.02))
+    axes.set_ylim(top=1000)
 
 
 def _defect(axes, rows):
