@@ -129,6 +129,7 @@ void ArkodeIntegrator::set_method() {
         ARKStepSetTableNum(arkode_, cash ? ARKODE_CASH_5_3_4 : ARKODE_SDIRK_5_3_4, ARKODE_ERK_NONE),
         "ARKStepSetTableNum");
   }
+  stages_.accept_stalled(1e-2);
   check(ARKStepSetNonlinConvCoef(arkode_, stage_tolerance(settings_.relative_tolerance)),
         "ARKStepSetNonlinConvCoef");
   solver_ = SUNNonlinSolNewEmpty(context_.get());

@@ -65,7 +65,8 @@ StageSolver::Outcome StageSolver::iterate(const Stage& stage) {
       return Outcome::converged;
     }
     if (iteration > 0 && norm > 0.9 * previous) {
-      return Outcome::slow;
+      // Where round-off ends the iteration, what it reached may do.
+      return norm <= stalled_tolerance_ ? Outcome::converged : Outcome::slow;
     }
     previous = norm;
   }

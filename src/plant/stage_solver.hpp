@@ -43,6 +43,10 @@ class StageSolver {
   /// Forgets everything learnt: the next stage linearizes anew and guesses from `acceleration`.
   void reset(SecondOrderSystem::ConstVector acceleration);
 
+  /// A stage whose iteration stalls counts as solved below this norm of the correction. Default:
+  /// none does.
+  void accept_stalled(double tolerance) { stalled_tolerance_ = tolerance; }
+
   /// The next stage linearizes anew.
   void forget() { linearized_ = false; }
 
@@ -70,6 +74,7 @@ class StageSolver {
   Eigen::PartialPivLU<Eigen::MatrixXd> lu_;
   double gamma_s_ = 0.0;  // that the factorization is for
   double rate_ = 1.0;     // of convergence, as last seen
+  double stalled_tolerance_ = 0.0;
   bool linearized_ = false;
   int age_ = 0;
   std::int64_t wasted_ = 0;  // iterations since the linearization that a better one had saved
