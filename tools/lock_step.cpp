@@ -10,7 +10,7 @@ namespace softarm {
 LockStep::LockStep(const Experiment& experiment)
     : experiment_(experiment), pipeline_(experiment), arm_(experiment.plant, 0) {}
 
-bool LockStep::step(LogRow& row) {
+bool LockStep::step(LogRow& row, bool logged) {
   const std::int64_t now_ns = ticks_++ * pipeline_.period_ns();
   arm_.advance_to(now_ns);
   frames_.clear();
@@ -29,8 +29,10 @@ bool LockStep::step(LogRow& row) {
                 .shadow = false,
                 .pressure_bar = pressures_},
                now_ns);
-  arm_.advance_to(now_ns + pipeline_.period_ns() / 2);
-  fill(row);
+  if (logged) {
+    arm_.advance_to(now_ns + pipeline_.period_ns() / 2);
+    fill(row);
+  }
   return true;
 }
 

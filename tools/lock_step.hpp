@@ -19,9 +19,10 @@ class LockStep {
   /// Keeps its own copy of the experiment. @throws as ControlPipeline and SimulatedArm
   explicit LockStep(const Experiment& experiment);
 
-  /// One tick at the next period. Leaves the plant, and `row`, in the middle of that period: there
-  /// the tick's reference belongs. Always true: an arm does not come to an end. @throws PlantError
-  bool step(LogRow& row);
+  /// One tick at the next period. Where it is `logged` it leaves the plant, and `row`, in the
+  /// middle of that period: there the tick's reference belongs. Otherwise the row stays as it was.
+  /// Always true: an arm does not come to an end. @throws PlantError
+  bool step(LogRow& row, bool logged = true);
 
   const ControlPipeline& pipeline() const { return pipeline_; }
   const SimulatedArm& arm() const { return arm_; }

@@ -50,7 +50,7 @@ bool LoggedRun::read_frame() {
   return has_next_ = false;
 }
 
-bool LoggedRun::step(LogRow& row) {
+bool LoggedRun::step(LogRow& row, bool logged) {
   if (!has_next_) return false;
   const std::int64_t now_ns = start_ns_ + ticks_++ * pipeline_.period_ns();
   frames_.clear();
@@ -64,6 +64,7 @@ bool LoggedRun::step(LogRow& row) {
   const std::int64_t before_ns = monotonic_now_ns();
   pipeline_.tick(input);
   tick_times_.add_ns(monotonic_now_ns() - before_ns);
+  if (!logged) return true;
   fill_from_pipeline(pipeline_, experiment_.arm, row);
   row.t_s = 1e-9 * static_cast<double>(now_ns - start_ns_);
   row.truth.resize(0);

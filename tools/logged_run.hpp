@@ -30,8 +30,9 @@ class LoggedRun {
   LoggedRun(const Experiment& experiment, const std::filesystem::path& log);
   ~LoggedRun();
 
-  /// One tick; false once the log is at its end. There is no truth to fill in.
-  bool step(LogRow& row);
+  /// One tick; false once the log is at its end. There is no truth to fill in, and nothing at all
+  /// where the tick is not `logged`.
+  bool step(LogRow& row, bool logged = true);
 
   const ControlPipeline& pipeline() const { return pipeline_; }
   const DurationHistogram& tick_times() const { return tick_times_; }

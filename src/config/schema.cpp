@@ -51,6 +51,9 @@ void describe_run(SchemaVisitor& visitor, RunSettings& run) {
   visitor.number({"tracking_from_s", "s", "after ACTIVE; tracking errors count from here on",
                   from_to(0.0, kMany)},
                  run.tracking_from_s);
+  visitor.number({"log_rate_hz", "Hz",
+                  "rows of log.csv, from which errors are taken; 0: every tick", from_to(0.0, 1e4)},
+                 run.log_rate_hz);
 }
 
 void describe_chambers(SchemaVisitor& visitor, std::vector<Chamber>& chambers) {

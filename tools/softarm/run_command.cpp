@@ -33,28 +33,28 @@ struct RunOptions {
   bool has_seed = false;
 };
 
-/// Steps whatever makes the rows to its end, or to `duration_s`; returns the wall time it took, in
-/// ns.
+/// Steps whatever makes the rows to its end, or to `duration_s`; every tick, or every
+/// `ticks_a_row` of them, is a row. Returns the wall time it took, log and all, in ns.
 template <class Stepper>
-std::int64_t record(Stepper& stepper, double duration_s, double period_s, ExperimentLog& log,
-                    ShapeLog& shapes, TrackingSummary& summary) {
+std::int64_t record(Stepper& stepper, double duration_s, double period_s, std::int64_t ticks_a_row,
+                    ExperimentLog& log, ShapeLog& shapes, TrackingSummary& summary) {
   Progress progress;
   LogRow row;
-  std::int64_t stepping_ns = 0;
+  const std::int64_t before_ns = monotonic_now_ns();
   const auto ticks = static_cast<std::int64_t>(std::llround(duration_s / period_s));
   for (std::int64_t k = 0; k < ticks; ++k) {
-    const std::int64_t before_ns = monotonic_now_ns();
-    if (!stepper.step(row)) break;
-    stepping_ns += monotonic_now_ns() - before_ns;
+    const bool logged = k % ticks_a_row == 0;
+    if (!stepper.step(row, logged)) break;
+    if (!logged) continue;
     log.add(row);
     shapes.add(row);
-    summary.add(row, period_s);
+    summary.add(row, static_cast<double>(ticks_a_row) * period_s);
     if (progress.due())
       progress.update(fmt::format("{:.1f} of {:.1f} s, {}", row.t_s, duration_s, name(row.mode)));
   }
   const ControlPipeline& pipeline = stepper.pipeline();
   summary.set_frames(pipeline.counters(), pipeline.late_frames());
-  return stepping_ns;
+  return monotonic_now_ns() - before_ns;
 }
 
 /// The plotting script: beside an installed program, else in the source tree this was built from.
@@ -95,7 +95,12 @@ int run(const RunOptions& options) {
   const auto record_and_report = [&](auto& stepper) {
     ExperimentLog log(options.out, experiment);
     ShapeLog shapes(options.out, experiment);
-    const std::int64_t took_ns = record(stepper, duration_s, period_s, log, shapes, summary);
+    const double log_rate_hz = experiment.run.log_rate_hz;
+    const std::int64_t ticks_a_row =
+        log_rate_hz > 0.0 ? std::max(1LL, std::llround(experiment.daemon.rate_hz / log_rate_hz))
+                          : 1;
+    const std::int64_t took_ns =
+        record(stepper, duration_s, period_s, ticks_a_row, log, shapes, summary);
     log.close();
     timing.real_time_factor =
         1e9 * summary.duration_s() / static_cast<double>(std::max<std::int64_t>(1, took_ns));

@@ -12,6 +12,7 @@ namespace softarm {
 struct RunSettings {
   double duration_s = 20.0;      ///< default of `softarm run` and tools/demo
   double tracking_from_s = 1.0;  ///< after ACTIVE; tracking errors count from here on
+  double log_rate_hz = 0.0;      ///< rows of log.csv, from which errors are taken; 0: every tick
 };
 
 struct Experiment : PipelineSettings {
