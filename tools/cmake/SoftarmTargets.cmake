@@ -9,6 +9,10 @@ target_compile_options(softarm_options INTERFACE -Wall -Wextra -Wconversion -Wsh
 if(SOFTARM_WARNINGS_AS_ERRORS)
   target_compile_options(softarm_options INTERFACE -Werror)
 endif()
+if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+  # The compiler collects garbage from 1 GB on instead of 128 MB: a fifth of the build's time.
+  add_compile_options(--param=ggc-min-heapsize=1000000)
+endif()
 if(SOFTARM_NATIVE)
   # g++ 12 takes its own AVX-512 intrinsics, undefined lanes and unused widths, for faults of ours.
   add_compile_options(-march=native -Wno-error=maybe-uninitialized -Wno-error=array-bounds)
