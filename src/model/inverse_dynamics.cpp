@@ -14,6 +14,9 @@
 #include "model/rotary_inertia.hpp"
 #include "softarm/model/dynamics.hpp"
 
+// In line at both of its places, for the base and for a moving frame: g++ would leave one a call.
+#define SOFTARM_INLINE [[gnu::always_inline]] inline
+
 namespace softarm {
 namespace {
 
@@ -97,8 +100,8 @@ struct FrameAcceleration {
 struct StillFrame {};
 
 template <bool kCoriolis>
-inline FrameAcceleration frame_acceleration(const FrameMotion& m, const SegmentLanes& k,
-                                            int l) noexcept {
+SOFTARM_INLINE FrameAcceleration frame_acceleration(const FrameMotion& m, const SegmentLanes& k,
+                                                    int l) noexcept {
   const double ux = k.ux[l], uy = k.uy[l];
   const Vector3& al = m.angular;
   if constexpr (!kCoriolis) {
@@ -122,14 +125,14 @@ inline FrameAcceleration frame_acceleration(const FrameMotion& m, const SegmentL
           {sweep.y, -sweep.x, 0.0}};
 }
 
-inline Vector3 acceleration(double p, double q, double p1, double q1, const Vector3& base,
-                            const FrameAcceleration& f) noexcept {
+SOFTARM_INLINE Vector3 acceleration(double p, double q, double p1, double q1, const Vector3& base,
+                                    const FrameAcceleration& f) noexcept {
   return {base.x + p * f.on_p.x + q * f.on_q.x + p1 * f.on_p1.x + q1 * f.on_q1.x,
           base.y + p * f.on_p.y + q * f.on_q.y + p1 * f.on_p1.y + q1 * f.on_q1.y,
           base.z + p * f.on_p.z + q * f.on_q.z + p1 * f.on_p1.z};
 }
-inline Vector3 acceleration(double, double, double, double, const Vector3& base,
-                            StillFrame) noexcept {
+SOFTARM_INLINE Vector3 acceleration(double, double, double, double, const Vector3& base,
+                                    StillFrame) noexcept {
   return base;
 }
 
@@ -160,8 +163,8 @@ inline void point_forces(const SegmentLanes& k, int l, SegmentForces& out) noexc
 
 /// Mass along the arc: the integrals of P, Q and (P1 u, Q1) times the acceleration.
 template <class Frame>
-inline void arc_forces(const SegmentLanes& k, int l, const Vector3& weight, const Frame& f,
-                       SegmentForces& out) noexcept {
+SOFTARM_INLINE void arc_forces(const SegmentLanes& k, int l, const Vector3& weight, const Frame& f,
+                               SegmentForces& out) noexcept {
   const double ux = k.ux[l], uy = k.uy[l];
   const auto& m = k.arc;
   const Vector3 on_p = acceleration(m.pp[l], m.pq[l], m.pp1[l], m.pq1[l],
@@ -195,8 +198,8 @@ void add_rotary_inertia(const SegmentParameters& segment, const Inputs& in, int 
 }
 
 template <MassModel kMass, class Frame>
-inline void own_forces(const SegmentLanes& k, int l, const Vector3& base, const Frame& f,
-                       SegmentForces& out) noexcept {
+SOFTARM_INLINE void own_forces(const SegmentLanes& k, int l, const Vector3& base, const Frame& f,
+                               SegmentForces& out) noexcept {
   const double mass = k.mass[l];
   out.force = mass * acceleration(k.centre.p[l], k.centre.q[l], k.centre.p1[l], k.centre.q1[l],
                                   base + lane(k.own_centre, l), f);
@@ -209,7 +212,7 @@ inline void own_forces(const SegmentLanes& k, int l, const Vector3& base, const 
 
 /// From S_{i-1} to S_i.
 template <bool kCoriolis, class Frame>
-inline void advance(const SegmentLanes& k, int l, const Frame& f, FrameMotion& m) noexcept {
+SOFTARM_INLINE void advance(const SegmentLanes& k, int l, const Frame& f, FrameMotion& m) noexcept {
   const Turn to_next = turn(k, l);
   m.linear = rotate_back(to_next, acceleration(k.tip.p[l], k.tip.q[l], k.tip.p1[l], k.tip.q1[l],
                                                m.linear + lane(k.own_tip, l), f));

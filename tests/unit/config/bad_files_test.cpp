@@ -66,7 +66,7 @@ const Spoilt kSpoilt[] = {
     {"  mass_kg: 0.15", "  mass_kg:", "arm.mass_kg", "nothing"},
     {"  mass_kg: 0.15", "  mass_kg: {all: 0.15}", "arm.mass_kg", "a section"},
     {"  mass_model: distributed", "  mass_model: point\n  radius_m: 0.02", "arm.radius_m",
-     "no cross-section"},
+     "no cross-section", "radius_m: 0.02"},
     {"  mass_model: distributed", "  mass_model: Distributed", "arm.mass_model",
      "one of point, distributed"},
     {"  mass_model: distributed", "  mass_model: [point, point]", "arm.mass_model", "a list of 2"},

@@ -135,7 +135,7 @@ TYPED_TEST(MessageDecoding, EveryWrongLengthIsRefused) {
 // A length beyond this project's capacities is refused even where the bytes are all there.
 TYPED_TEST(MessageDecoding, MoreThanTheCapacitiesIsRefused) {
   if (length_fields(TypeParam{}).empty()) GTEST_SKIP() << "a message of fixed size";
-  EXPECT_FALSE(this->accepts(encoded(example<TypeParam>(64 * 4 + 4, 8))));
+  EXPECT_FALSE(this->accepts(encoded(example<TypeParam>(4 * kMaxBodies + 1, 8))));
 }
 
 TYPED_TEST(MessageDecoding, RandomBytesAreRefused) {
