@@ -8,6 +8,7 @@
 #include <random>
 
 #include "counted_malloc.hpp"
+#include "softarm/estimation/mocap_frame.hpp"
 #include "unit/transport/messages.hpp"
 
 namespace softarm {
