@@ -139,6 +139,7 @@ TEST(ClosedLoop, BendsBeyondNinetyDegrees) {
   experiment.control.kp.resize(2);
   experiment.control.kd.resize(2);
   experiment.control.ki.resize(2);
+  experiment.plant.payload_kg.resize(1);
   experiment.reference = through(1, {{2.0, 0.0}, {0.0, 2.0}, {-1.9, 0.5}}, 2.0);
   const Tracking tracking = track(experiment, 7.0, 1.0);
   EXPECT_GT(tracking.largest_theta_rad, pi / 2.0 + 0.3);
