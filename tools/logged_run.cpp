@@ -2,8 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <cstdio>
-#include <lcm/lcm-cpp.hpp>
 #include <stdexcept>
 
 #include "lock_step.hpp"
@@ -11,17 +9,20 @@
 #include "softarm/transport/message_decoding.hpp"
 
 namespace softarm {
+namespace {
+constexpr std::int64_t kLatestTime_us = 4'000'000'000'000'000;  // nanoseconds must not overflow
+}  // namespace
 
 LoggedRun::LoggedRun(const Experiment& experiment, const std::filesystem::path& log)
     : experiment_(experiment),
       pipeline_(experiment),
       adapter_(experiment.daemon.bodies, experiment.arm),
       clock_(experiment.daemon.capture_time, experiment.daemon.safety.frame_latency_s),
-      log_(std::make_unique<lcm::LogFile>(log.string(), "r")) {
-  if (!log_->good())
+      file_(log, std::ios::binary),
+      log_(file_) {
+  if (!file_)
     throw std::runtime_error(fmt::format(
         "cannot read {}: is it an LCM log (softarm import, lcm-logger)?", log.string()));
-  size_bytes_ = static_cast<std::int64_t>(std::filesystem::file_size(log));
   if (!read_frame())
     throw std::runtime_error(fmt::format(
         "{} holds no frame on channel {}; daemon.lcm.mocap_channel says which to look for",
@@ -29,20 +30,17 @@ LoggedRun::LoggedRun(const Experiment& experiment, const std::filesystem::path& 
   start_ns_ = next_arrival_ns_;
 }
 
-LoggedRun::~LoggedRun() = default;
-
 bool LoggedRun::read_frame() {
   softarm_messages::mocap_frame_t message;
-  while (const lcm::LogEvent* event = log_->readNextEvent()) {
-    read_bytes_ = std::ftell(log_->getFilePtr());
-    if (event->channel != experiment_.daemon.lcm.mocap_channel) continue;
-    const auto* bytes = static_cast<const std::byte*>(event->data);
-    if (!decode({bytes, static_cast<std::size_t>(event->datalen)}, message)) {
+  for (LogEvent event; log_.next(event);) {
+    if (event.channel != experiment_.daemon.lcm.mocap_channel) continue;
+    const bool has_time = event.time_us >= 0 && event.time_us < kLatestTime_us;
+    if (!has_time || !decode(event.data, message)) {
       ++malformed_;
       continue;
     }
     // A log written from several sources may step back a little; time here does not.
-    next_arrival_ns_ = std::max(next_arrival_ns_, event->timestamp * 1000);
+    next_arrival_ns_ = std::max(next_arrival_ns_, event.time_us * 1000);
     adapter_.to_frame(message, next_);
     next_.capture_ns = clock_.capture_ns(next_arrival_ns_, message.capture_time_us);
     return has_next_ = true;

@@ -4,7 +4,7 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <memory>
+#include <fstream>
 #include <vector>
 
 #include "log_row.hpp"
@@ -12,11 +12,8 @@
 #include "softarm/daemon/control_pipeline.hpp"
 #include "softarm/daemon/histogram.hpp"
 #include "softarm/estimation/clock_relation.hpp"
+#include "softarm/transport/event_log.hpp"
 #include "softarm/transport/mocap_adapter.hpp"
-
-namespace lcm {
-class LogFile;
-}
 
 namespace softarm {
 
@@ -28,7 +25,6 @@ class LoggedRun {
   /// @throws std::runtime_error if the log cannot be opened or holds no frame on the configured
   /// channel
   LoggedRun(const Experiment& experiment, const std::filesystem::path& log);
-  ~LoggedRun();
 
   /// One tick; false once the log is at its end. There is no truth to fill in, and nothing at all
   /// where the tick is not `logged`.
@@ -38,11 +34,8 @@ class LoggedRun {
   const DurationHistogram& tick_times() const { return tick_times_; }
   std::int64_t malformed() const { return malformed_; }
 
-  /// The log ended before its file did: from `read_bytes()` of `size_bytes()` on it is damaged or
-  /// cut.
-  bool damaged() const { return !has_next_ && read_bytes_ != size_bytes_; }
-  std::int64_t read_bytes() const { return read_bytes_; }
-  std::int64_t size_bytes() const { return size_bytes_; }
+  /// Tells what of the log is damaged or cut; what precedes and follows that was used.
+  const EventLogReader& log() const { return log_; }
 
  private:
   bool read_frame();
@@ -51,7 +44,8 @@ class LoggedRun {
   ControlPipeline pipeline_;
   MocapAdapter adapter_;
   ClockRelation clock_;
-  std::unique_ptr<lcm::LogFile> log_;
+  std::ifstream file_;
+  EventLogReader log_;
   std::vector<MocapFrame> frames_;
   MocapFrame next_;  ///< read from the log, not arrived yet
   std::int64_t next_arrival_ns_ = 0;
@@ -59,8 +53,6 @@ class LoggedRun {
   std::int64_t start_ns_ = 0;
   std::int64_t ticks_ = 0;
   std::int64_t malformed_ = 0;
-  std::int64_t size_bytes_ = 0;
-  std::int64_t read_bytes_ = 0;
   DurationHistogram tick_times_;
 };
 

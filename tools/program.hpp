@@ -11,7 +11,9 @@ namespace softarm {
 enum ExitCode : int {
   kExitOk = 0,
   kExitFailure = 1,         ///< anything not listed here
+  kExitDifferent = 2,       ///< softarm replay: a command or status is not what was recorded
   kExitUsage = 64,          ///< the command line is wrong
+  kExitData = 65,           ///< a log is damaged, or lacks what it was read for
   kExitOtherInstance = 75,  ///< another instance holds the command channel
   kExitConfiguration = 78,  ///< the configuration is wrong (ConfigError)
 };
@@ -20,6 +22,10 @@ enum ExitCode : int {
 const char* version_text() noexcept;
 /// The commit this was built from, "-dirty" where the tree differed from it.
 const char* commit_text() noexcept;
+
+/// What decides how numbers round: version and commit, compiler, the instruction set compiled for,
+/// the one that the C library's functions choose by on this machine, and that library's version.
+std::string build_text();
 
 /// Prints on stderr. What cannot be written (a full disk, a closed pipe) is lost: no program that
 /// moves an arm may end for that.

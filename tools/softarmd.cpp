@@ -74,7 +74,8 @@ class DaemonLoop {
         link_(experiment,
               {.version = fmt::format("{} {}", version_text(), commit_text()),
                .configuration_hash = experiment.hash,
-               .seed = experiment.seed},
+               .seed = experiment.seed,
+               .build = build_text()},
               shadow),
         judge_overruns_(experiment.daemon.realtime.fifo),
         ticks_per_second_(static_cast<std::int64_t>(experiment.daemon.rate_hz)),
@@ -99,6 +100,8 @@ class DaemonLoop {
           pipeline_.fully_vented())
         ++vented_commands;
     }
+    // What was sent only once, not all at once: a logger's queue is short.
+    while (link_.repeat_record()) sleep_until_ns(monotonic_now_ns() + kRepeatPause_ns);
   }
 
   const LoopTiming& timing() const { return timing_; }
@@ -106,8 +109,9 @@ class DaemonLoop {
   const DaemonLink& link() const { return link_; }
 
  private:
-  static constexpr int kLastCommands =
-      3;  ///< zero commands sent before leaving: one may be lost on the wire
+  /// Zero commands sent before leaving: one may be lost on the wire.
+  static constexpr int kLastCommands = 3;
+  static constexpr std::int64_t kRepeatPause_ns = 500'000;
 
   void tick(std::int64_t woken_ns) noexcept {
     TickInput input = link_.collect(woken_ns);
@@ -118,6 +122,7 @@ class DaemonLoop {
     link_.publish_command(decided_ns, output);
     ++timing_.ticks;
     link_.publish_status(woken_ns, pipeline_, timing_);
+    link_.publish_record(input, output);
     if (timing_.ticks % ticks_per_second_ == 0) link_.publish_timing(woken_ns, timing_);
     timing_.tick.add_ns(decided_ns - woken_ns);
     timing_.publish.add_ns(monotonic_now_ns() - decided_ns);

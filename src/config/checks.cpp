@@ -206,9 +206,11 @@ class Checks {
         {"operator_channel", lcm.operator_channel},
         {"status_channel", lcm.status_channel},
         {"timing_channel", lcm.timing_channel},
+        {"tick_channel", lcm.tick_channel},
         {"plant_channel", lcm.plant_channel}};
     std::set<std::string> seen;
     for (const auto& [key, name] : channels) {
+      if (name.empty()) continue;  // what may be left out
       const bool word = std::all_of(name.begin(), name.end(), [](char c) {
         return std::isalnum(static_cast<unsigned char>(c)) || std::strchr("_-./", c) != nullptr;
       });

@@ -155,6 +155,10 @@ void describe_lcm(SchemaVisitor& visitor, LcmSettings& lcm) {
   channel("operator_channel", "operator's commands", lcm.operator_channel);
   channel("status_channel", "controller status", lcm.status_channel);
   channel("timing_channel", "timing histograms", lcm.timing_channel);
+  visitor.text(
+      {"tick_channel", "", "what every tick was given, for softarm replay; empty: not published",
+       from_to(0, 63)},
+      lcm.tick_channel);
   channel("plant_channel", "a simulated arm's true state", lcm.plant_channel);
   visitor.number({"command_validity_s", "s", "after which the valve side vents by itself",
                   above_to(0.0, 10.0)},

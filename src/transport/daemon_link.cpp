@@ -10,8 +10,8 @@
 namespace softarm {
 namespace {
 
-constexpr int kFrameCapacity =
-    64;  ///< what may arrive between two ticks; more is dropped by LCM and counted as missing
+/// What may arrive between two ticks; more is dropped by LCM and counted as missing.
+constexpr int kFrameCapacity = TickRecorder::kMostFrames;
 constexpr int kOtherCapacity = 16;
 constexpr int kMessagesPerTick = kFrameCapacity + 3 * kOtherCapacity;
 constexpr auto kNever = std::numeric_limits<std::int64_t>::min();
@@ -24,76 +24,27 @@ std::int64_t wall_clock_ns() noexcept {
   return std::int64_t{now.tv_sec} * 1'000'000'000 + now.tv_nsec;
 }
 
-std::int32_t counter(std::int64_t value) noexcept {
-  return static_cast<std::int32_t>(
-      std::min<std::int64_t>(value, std::numeric_limits<std::int32_t>::max()));
-}
-
-std::int16_t flags_of(const TickOutput& output, bool shadow) noexcept {
-  const bool bits[] = {
-      output.saturated, output.slew_limited, output.reference_limited, output.soft_limit,
-      shadow,           output.armed};
-  int flags = 0;
-  for (int k = 0; k < 6; ++k) flags |= bits[k] ? 1 << k : 0;
-  return static_cast<std::int16_t>(flags);
-}
-
-/// Component pairs of a 2n vector; NaN where it is empty.
-void put_pairs(const SegmentVector& from, std::vector<std::vector<float>>& to) noexcept {
-  for (std::size_t i = 0; i < to.size(); ++i)
-    for (std::size_t axis = 0; axis < 2; ++axis) {
-      const auto k = static_cast<Eigen::Index>(2 * i + axis);
-      to[i][axis] =
-          k < from.size() ? static_cast<float>(from[k]) : std::numeric_limits<float>::quiet_NaN();
-    }
-}
-
 }  // namespace
 
-DaemonLink::DaemonLink(const PipelineSettings& settings, Provenance provenance, bool shadow)
+DaemonLink::DaemonLink(const PipelineSettings& settings, const Provenance& provenance, bool shadow)
     : settings_(settings.daemon),
       adapter_(settings.daemon.bodies, settings.arm),
       clock_(settings.daemon.capture_time, settings.daemon.safety.frame_latency_s),
       node_(settings.daemon.lcm.url),
       dof_(settings.arm.dof()),
-      by_torque_(settings.actuation.kind == ActuationKind::torque),
-      frames_(kFrameCapacity),
+      messages_(settings, provenance, shadow),
       newest_measurement_ns_(kNever),
       reference_sequence_(kNever),
       operator_sequence_(kNever) {
-  const auto segments = static_cast<std::size_t>(settings.arm.size());
-  std::size_t chambers = 0;
-  for (const auto& segment : settings.actuation.segments) chambers += segment.size();
-
+  if (!settings_.lcm.tick_channel.empty()) recorder_.emplace(settings, provenance, shadow);
+  frames_.resize(static_cast<std::size_t>(
+      recorder_ ? std::min(kFrameCapacity, recorder_->frame_capacity()) : kFrameCapacity));
   // Everything that grows is grown here, so that the loop never has to.
   frame_message_.bodies.reserve(4 * static_cast<std::size_t>(kMaxBodies));
   for (auto* list : {&reference_message_.u_rad, &reference_message_.velocity_radps,
                      &reference_message_.acceleration_radps2})
     list->reserve(2 * kMaxSegments);
   measurement_message_.pressure_bar.reserve(kMaxChambers);
-  command_message_.shadow = shadow ? 1 : 0;
-  command_message_.validity_us =
-      static_cast<std::int32_t>(std::lround(1e6 * settings_.lcm.command_validity_s));
-  command_message_.sequence = 0;
-  command_message_.num_chambers = static_cast<std::int16_t>(chambers);
-  command_message_.pressure_bar.assign(chambers, 0.0F);
-  torque_message_.shadow = command_message_.shadow;
-  torque_message_.validity_us = command_message_.validity_us;
-  torque_message_.num_moments = static_cast<std::int16_t>(chambers);
-  torque_message_.torque_nm.assign(chambers, 0.0);
-  status_message_ = {};
-  status_message_.version = std::move(provenance.version);
-  status_message_.configuration_hash = static_cast<std::int64_t>(provenance.configuration_hash);
-  status_message_.seed = static_cast<std::int64_t>(provenance.seed);
-  status_message_.num_segments = static_cast<std::int16_t>(segments);
-  status_message_.num_chambers = static_cast<std::int16_t>(chambers);
-  for (auto* pairs : {&status_message_.u_rad, &status_message_.velocity_radps,
-                      &status_message_.reference_u_rad, &status_message_.tau_actuation_nm})
-    pairs->assign(segments, std::vector<float>(2));
-  for (auto* list : {&status_message_.phi_rad, &status_message_.theta_rad,
-                     &status_message_.residual_twist_rad, &status_message_.residual_length_m})
-    list->assign(segments, 0.0F);
-  status_message_.pressure_bar.assign(chambers, 0.0F);
 
   node_.subscribe(settings_.lcm.mocap_channel, kFrameCapacity,
                   [this](const auto& packet) { take_frame(packet); });
@@ -178,55 +129,37 @@ void DaemonLink::take_measurement(const ReceivedMessage& packet) noexcept {
 }
 
 void DaemonLink::publish_command(std::int64_t now_ns, const TickOutput& output) noexcept {
-  ++command_message_.sequence;
-  command_message_.time_us = now_ns / 1000;
-  for (std::size_t j = 0; j < command_message_.pressure_bar.size(); ++j)
-    command_message_.pressure_bar[j] =
-        static_cast<float>(output.pressure_bar[static_cast<Eigen::Index>(j)]);
-  if (by_torque_) {
-    torque_message_.sequence = command_message_.sequence;
-    torque_message_.time_us = command_message_.time_us;
-    std::copy(output.pressure_bar.begin(), output.pressure_bar.end(),
-              torque_message_.torque_nm.begin());
-    if (!node_.publish(settings_.lcm.command_channel, torque_message_)) ++unsent_;
-    return;
-  }
-  if (!node_.publish(settings_.lcm.command_channel, command_message_)) ++unsent_;
+  messages_.set_command(++commands_, output);
+  messages_.pressure_command.time_us = messages_.torque_command.time_us = now_ns / 1000;
+  const std::string& channel = settings_.lcm.command_channel;
+  const bool sent = messages_.by_torque() ? node_.publish(channel, messages_.torque_command)
+                                          : node_.publish(channel, messages_.pressure_command);
+  if (!sent) ++unsent_;
 }
 
 void DaemonLink::publish_status(std::int64_t now_ns, const ControlPipeline& pipeline,
                                 const LoopTiming& timing) noexcept {
-  const TickOutput& output = pipeline.output();
-  const FrameCounters& frames = pipeline.counters();
-  const CurvatureEstimate& estimate = pipeline.estimate();
-  auto& status = status_message_;
+  messages_.set_status(timing.ticks, pipeline);
+  auto& status = messages_.status;
   status.time_us = now_ns / 1000;
-  status.tick = timing.ticks;
-  status.frame_number = output.frame_number;
-  status.mode = static_cast<std::int8_t>(output.mode);
-  status.reason = static_cast<std::int8_t>(output.reason);
-  status.flags = flags_of(output, command_message_.shadow != 0);
-  status.frame_age_s = static_cast<float>(output.frame_age_s);
-  status.frames_accepted = counter(frames.accepted);
-  status.frames_rejected = counter(frames.rejected() + pipeline.late_frames());
-  status.frames_repeated = counter(frames.repeated);
-  status.frames_missing = counter(frames.missing);
   status.overruns = counter(timing.overruns);
   status.messages_malformed = counter(malformed_);
-  put_pairs(output.motion.u_rad, status.u_rad);
-  put_pairs(output.motion.velocity_radps, status.velocity_radps);
-  put_pairs(output.reference.u, status.reference_u_rad);
-  put_pairs(output.tau_actuation_nm, status.tau_actuation_nm);
-  for (std::size_t i = 0; i < status.theta_rad.size(); ++i) {
-    const float x = status.u_rad[i][0];
-    const float y = status.u_rad[i][1];
-    status.phi_rad[i] = std::atan2(y, x);
-    status.theta_rad[i] = std::hypot(x, y);
-    status.residual_twist_rad[i] = static_cast<float>(estimate.twist_rad[i]);
-    status.residual_length_m[i] = static_cast<float>(estimate.length_error_m[i]);
-  }
-  status.pressure_bar = command_message_.pressure_bar;
   if (!node_.publish(settings_.lcm.status_channel, status)) ++unsent_;
+}
+
+void DaemonLink::publish_record(const TickInput& input, const TickOutput& output) noexcept {
+  if (!recorder_) return;
+  if (recorder_->full()) repeat_record();
+  const auto bytes = recorder_->record(commands_, input, output.pressure_bar);
+  if (!node_.publish_encoded(settings_.lcm.tick_channel, bytes)) ++unsent_;
+}
+
+bool DaemonLink::repeat_record() noexcept {
+  if (!recorder_) return false;
+  const auto bytes = recorder_->take_oldest();
+  if (bytes.empty()) return false;
+  if (!node_.publish_encoded(settings_.lcm.tick_channel, bytes)) ++unsent_;
+  return true;
 }
 
 void DaemonLink::publish_timing(std::int64_t now_ns, const LoopTiming& timing) noexcept {

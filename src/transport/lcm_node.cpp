@@ -11,8 +11,6 @@
 namespace softarm {
 namespace {
 
-constexpr std::size_t kLargestMessage = 60'000;  // the largest UDP payload, less LCM's header
-
 /// LCM takes channel names for regular expressions; we mean them literally.
 std::string quoted(const std::string& channel) {
   std::string pattern;
@@ -26,7 +24,7 @@ std::string quoted(const std::string& channel) {
 /// noexcept: nothing may unwind through LCM's C code, where it would leave a lock behind.
 void dispatch(const lcm_recv_buf_t* packet, const char* /*channel*/, void* user) noexcept {
   // A packet with an unterminated channel name has been seen to claim 2^32 - 1 bytes.
-  if (packet->data == nullptr || packet->data_size > kLargestMessage) return;
+  if (packet->data == nullptr || packet->data_size > LcmNode::kLargestMessage) return;
   const auto& handler = *static_cast<const LcmNode::Handler*>(user);
   handler({.bytes = {static_cast<const std::byte*>(packet->data), packet->data_size},
            .arrival_utime_us = packet->recv_utime});
@@ -66,6 +64,12 @@ bool LcmNode::wait_until(std::int64_t deadline_ns) noexcept {
   const timespec timeout{.tv_sec = left_ns / 1'000'000'000, .tv_nsec = left_ns % 1'000'000'000};
   pollfd descriptor{.fd = lcm_get_fileno(lcm_), .events = POLLIN, .revents = 0};
   return ppoll(&descriptor, 1, &timeout, nullptr) > 0 && lcm_handle_timeout(lcm_, 0) > 0;
+}
+
+bool LcmNode::publish_encoded(const std::string& channel,
+                              std::span<const std::byte> bytes) noexcept {
+  return !bytes.empty() && lcm_publish(lcm_, channel.c_str(), bytes.data(),
+                                       static_cast<unsigned int>(bytes.size())) == 0;
 }
 
 bool LcmNode::send(const char* channel, int size) noexcept {

@@ -4,12 +4,14 @@
 
 #include "softarm/actuation/pressure_allocator.hpp"
 #include "softarm/estimation/mocap_frame.hpp"
+#include "softarm/transport/tick_record.hpp"
 
 namespace softarm {
 namespace {
 
 constexpr std::size_t kHash = 8;
-constexpr std::size_t kLongestVersion = 256;
+constexpr std::size_t kLongestText = 256;             // of a version, of a build, its end included
+constexpr std::size_t kBody = 4 + 1 + 3 * 8 + 4 * 8;  // of a frame
 
 /// A big-endian 16 or 32 bit length at `offset`; -1 where the bytes end before it.
 int length16_at(std::span<const std::byte> bytes, std::size_t offset) noexcept {
@@ -52,7 +54,6 @@ bool decode_list(std::span<const std::byte> bytes, std::size_t fixed, std::size_
 }  // namespace
 
 bool decode(std::span<const std::byte> bytes, softarm_messages::mocap_frame_t& message) noexcept {
-  constexpr std::size_t kBody = 4 + 1 + 3 * 8 + 4 * 8;
   return decode_list(bytes, 8 + 8, kBody, 4 * kMaxBodies, message);  // other bodies may be in view
 }
 
@@ -85,7 +86,7 @@ bool decode(std::span<const std::byte> bytes,
             softarm_messages::controller_status_t& message) noexcept {
   constexpr std::size_t kBeforeVersion = 5 * 8;
   const std::int64_t version = length32_at(bytes, kHash + kBeforeVersion);
-  if (version < 1 || version > static_cast<std::int64_t>(kLongestVersion)) return false;
+  if (version < 1 || version > static_cast<std::int64_t>(kLongestText)) return false;
   const std::size_t counts =
       kHash + kBeforeVersion + 4 + static_cast<std::size_t>(version) + 4 + 4 + 6 * 4;
   const int segments = bounded(length16_at(bytes, counts), kMaxSegments);
@@ -110,6 +111,23 @@ bool decode(std::span<const std::byte> bytes, softarm_messages::plant_state_t& m
 
 bool decode(std::span<const std::byte> bytes, softarm_messages::timing_t& message) noexcept {
   return decode_exactly(bytes, kHash + 3 * 8 + 4 * 32 * 4 + 4 * 4, message);
+}
+
+bool decode(std::span<const std::byte> bytes, softarm_messages::tick_record_t& message) noexcept {
+  constexpr std::size_t kCounts = kHash + 5 * 8 + 4 + 4;  // numbers and flags come first
+  const int chambers = bounded(length16_at(bytes, kCounts), kMaxChambers);
+  const int dimension = bounded(length16_at(bytes, kCounts + 2), 2 * kMaxSegments);
+  const int frames = bounded(length16_at(bytes, kCounts + 4), TickRecorder::kMostFrames);
+  if (chambers < 0 || dimension < 0 || frames < 0) return false;
+  std::size_t at = kCounts + 6 + 8 * static_cast<std::size_t>(chambers + 3 * dimension);
+  for (int k = 0; k < frames; ++k) {
+    const int bodies = bounded(length16_at(bytes, at + 2 * 8), kMaxBodies);
+    if (bodies < 1) return false;
+    at += 2 * 8 + 2 + kBody * static_cast<std::size_t>(bodies);
+  }
+  const std::int64_t build = length32_at(bytes, at);
+  if (build < 1 || build > static_cast<std::int64_t>(kLongestText)) return false;
+  return decode_exactly(bytes, at + 4 + static_cast<std::size_t>(build) + 8, message);
 }
 
 }  // namespace softarm

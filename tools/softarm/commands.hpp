@@ -27,6 +27,9 @@ void add_identify_command(CLI::App& app);
 /// softarm import CSV MAP.yaml --out LOG
 void add_import_command(CLI::App& app);
 
+/// softarm replay LOG CONFIG [--any-configuration] [--json]
+void add_replay_command(CLI::App& app);
+
 /// softarm run CONFIG [--out DIR] [--duration S] [--seed N]
 void add_run_command(CLI::App& app);
 

@@ -119,11 +119,14 @@ int run(const RunOptions& options) {
   fmt::print("{}{:.0f} times faster than real time; log, summary and timing are in {}\n",
              summary.table(), timing.real_time_factor, options.out);
   if (options.plots) plot(options.out);
-  if (logged && logged->damaged()) {
+  if (logged && logged->log().damage_count() > 0) {
+    const LogDamage& first = logged->log().damages().front();
     print_error("softarm",
-                fmt::format("{} is damaged or cut at byte {} of {}; what precedes it was used",
-                            options.mocap_log, logged->read_bytes(), logged->size_bytes()));
-    return kExitFailure;
+                fmt::format("{}: bytes {} to {} are damaged or cut, {} stretches and {} bytes in "
+                            "all; what precedes and follows them was used",
+                            options.mocap_log, first.begin, first.end, logged->log().damage_count(),
+                            logged->log().damaged_bytes()));
+    return kExitData;
   }
   return kExitOk;
 }

@@ -2,15 +2,12 @@
 #pragma once
 
 #include <cstdint>
-#include <softarm_messages/controller_status_t.hpp>
+#include <optional>
 #include <softarm_messages/curvature_reference_t.hpp>
 #include <softarm_messages/mocap_frame_t.hpp>
 #include <softarm_messages/operator_command_t.hpp>
-#include <softarm_messages/pressure_command_t.hpp>
 #include <softarm_messages/pressure_measurement_t.hpp>
 #include <softarm_messages/timing_t.hpp>
-#include <softarm_messages/torque_command_t.hpp>
-#include <string>
 #include <vector>
 
 #include "softarm/daemon/control_pipeline.hpp"
@@ -18,15 +15,10 @@
 #include "softarm/estimation/clock_relation.hpp"
 #include "softarm/transport/lcm_node.hpp"
 #include "softarm/transport/mocap_adapter.hpp"
+#include "softarm/transport/output_messages.hpp"
+#include "softarm/transport/tick_record.hpp"
 
 namespace softarm {
-
-/// Who is speaking: told in every status message.
-struct Provenance {
-  std::string version;  ///< release and commit
-  std::uint64_t configuration_hash = 0;
-  std::uint64_t seed = 0;
-};
 
 /// The four durations the daemon measures of itself.
 struct LoopTiming {
@@ -42,7 +34,7 @@ struct LoopTiming {
 class DaemonLink {
  public:
   /// @throws TransportError
-  DaemonLink(const PipelineSettings& settings, Provenance provenance, bool shadow);
+  DaemonLink(const PipelineSettings& settings, const Provenance& provenance, bool shadow);
 
   /// Handles what has arrived, a bounded number of messages. The frames it points to live until the
   /// next call.
@@ -53,6 +45,12 @@ class DaemonLink {
   void publish_status(std::int64_t now_ns, const ControlPipeline& pipeline,
                       const LoopTiming& timing) noexcept;
   void publish_timing(std::int64_t now_ns, const LoopTiming& timing) noexcept;
+  /// What the tick of the last command was given, and the record of TickRecorder::kRepeatAfter
+  /// ticks ago once more. Nothing where no channel is configured for it.
+  void publish_record(const TickInput& input, const TickOutput& output) noexcept;
+  /// Sends the oldest record that has been sent only once; false if there is none. For the end,
+  /// when no tick follows.
+  bool repeat_record() noexcept;
 
   /// Messages refused before decoding, and publications that failed.
   std::int64_t malformed() const noexcept { return malformed_; }
@@ -70,7 +68,8 @@ class DaemonLink {
   ClockRelation clock_;
   LcmNode node_;
   int dof_;
-  bool by_torque_;
+  OutputMessages messages_;
+  std::optional<TickRecorder> recorder_;
 
   // What the handlers fill during collect().
   std::vector<MocapFrame> frames_;
@@ -85,6 +84,7 @@ class DaemonLink {
   std::int64_t newest_operator_ns_ = 0;
   std::int64_t reference_sequence_;
   std::int64_t operator_sequence_;
+  std::int64_t commands_ = 0;
   std::int64_t malformed_ = 0;
   std::int64_t unsent_ = 0;
 
@@ -92,9 +92,6 @@ class DaemonLink {
   softarm_messages::curvature_reference_t reference_message_;
   softarm_messages::operator_command_t operator_message_;
   softarm_messages::pressure_measurement_t measurement_message_;
-  softarm_messages::pressure_command_t command_message_;
-  softarm_messages::torque_command_t torque_message_;
-  softarm_messages::controller_status_t status_message_;
   softarm_messages::timing_t timing_message_;
 };
 

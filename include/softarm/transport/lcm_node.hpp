@@ -30,6 +30,8 @@ struct ReceivedMessage {
 class LcmNode {
  public:
   using Handler = std::function<void(const ReceivedMessage&)>;
+  static constexpr int kLargestMessage =
+      60'000;  ///< bytes: the largest UDP payload, less LCM's header
 
   /// @throws TransportError if LCM refuses the URL or no multicast route exists
   explicit LcmNode(const std::string& url);
@@ -56,6 +58,9 @@ class LcmNode {
     const int size = message.encode(buffer_.data(), 0, static_cast<int>(buffer_.size()));
     return size >= 0 && send(channel.c_str(), size);
   }
+
+  /// Publishes what is encoded already; false if it is nothing, or was refused. Allocates nothing.
+  bool publish_encoded(const std::string& channel, std::span<const std::byte> bytes) noexcept;
 
  private:
   bool send(const char* channel, int size) noexcept;

@@ -10,6 +10,7 @@
 #include <softarm_messages/plant_state_t.hpp>
 #include <softarm_messages/pressure_command_t.hpp>
 #include <softarm_messages/pressure_measurement_t.hpp>
+#include <softarm_messages/tick_record_t.hpp>
 #include <softarm_messages/timing_t.hpp>
 #include <softarm_messages/torque_command_t.hpp>
 #include <span>
@@ -33,5 +34,6 @@ bool decode(std::span<const std::byte> bytes,
             softarm_messages::controller_status_t& message) noexcept;
 bool decode(std::span<const std::byte> bytes, softarm_messages::plant_state_t& message) noexcept;
 bool decode(std::span<const std::byte> bytes, softarm_messages::timing_t& message) noexcept;
+bool decode(std::span<const std::byte> bytes, softarm_messages::tick_record_t& message) noexcept;
 
 }  // namespace softarm

@@ -34,7 +34,8 @@ class DaemonLinkOverUdp : public ::testing::Test {
   void SetUp() override {
     try {
       sender = std::make_unique<LcmNode>(settings.daemon.lcm.url);
-      link = std::make_unique<DaemonLink>(settings, Provenance{.version = "test"}, false);
+      link = std::make_unique<DaemonLink>(settings, Provenance{.version = "test", .build = "build"},
+                                          false);
     } catch (const TransportError& error) {
       GTEST_SKIP() << error.what();
     }
@@ -102,6 +103,7 @@ TEST_F(DaemonLinkOverUdp, TenThousandTicksAllocateNothing) {
     link->publish_command(monotonic_now_ns(), output);
     ++timing.ticks;
     link->publish_status(input.now_ns, pipeline, timing);
+    link->publish_record(input, output);
     if (k % 100 == 0) link->publish_timing(input.now_ns, timing);
     // With its first message LCM makes itself a lock; that is start-up.
     if (frames > 0) {

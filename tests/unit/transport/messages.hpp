@@ -136,4 +136,23 @@ inline softarm_messages::timing_t example(int /*segments*/, int /*chambers*/) {
   return message;
 }
 
+template <>
+inline softarm_messages::tick_record_t example(int segments, int chambers) {
+  softarm_messages::tick_record_t message{};
+  message.tick = 18;
+  message.num_chambers = static_cast<std::int16_t>(segments * chambers);
+  message.dimension = static_cast<std::int16_t>(segments < 10 ? 2 * segments : 0);
+  message.num_frames = 1;
+  message.pressure_bar = numbers<double>(segments * chambers, 0.5);
+  message.u_rad = numbers<double>(message.dimension, 0.1);
+  message.velocity_radps = numbers<double>(message.dimension, 100.1);
+  message.acceleration_radps2 = numbers<double>(message.dimension, -100.1);
+  const auto frame = example<softarm_messages::mocap_frame_t>(segments, chambers);
+  message.frames.push_back(
+      {.frame_number = 5, .capture_ns = 6, .num_bodies = frame.num_bodies, .bodies = frame.bodies});
+  message.build = "softarm 0.1.0 commit 0123456789-dirty";
+  message.digest = -7;
+  return message;
+}
+
 }  // namespace softarm::test

@@ -1,0 +1,110 @@
+#include "softarm/transport/output_messages.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+namespace softarm {
+namespace {
+
+std::int16_t flags_of(const TickOutput& output, bool shadow) noexcept {
+  const bool bits[] = {
+      output.saturated, output.slew_limited, output.reference_limited, output.soft_limit,
+      shadow,           output.armed};
+  int flags = 0;
+  for (int k = 0; k < 6; ++k) flags |= bits[k] ? 1 << k : 0;
+  return static_cast<std::int16_t>(flags);
+}
+
+/// Component pairs of a 2n vector; NaN where it is empty.
+void put_pairs(const SegmentVector& from, std::vector<std::vector<float>>& to) noexcept {
+  for (std::size_t i = 0; i < to.size(); ++i)
+    for (std::size_t axis = 0; axis < 2; ++axis) {
+      const auto k = static_cast<Eigen::Index>(2 * i + axis);
+      to[i][axis] =
+          k < from.size() ? static_cast<float>(from[k]) : std::numeric_limits<float>::quiet_NaN();
+    }
+}
+
+}  // namespace
+
+std::int32_t counter(std::int64_t value) noexcept {
+  return static_cast<std::int32_t>(
+      std::min<std::int64_t>(value, std::numeric_limits<std::int32_t>::max()));
+}
+
+OutputMessages::OutputMessages(const PipelineSettings& settings, const Provenance& provenance,
+                               bool shadow)
+    : pressure_command{},
+      torque_command{},
+      status{},
+      by_torque_(settings.actuation.kind == ActuationKind::torque) {
+  const auto segments = static_cast<std::size_t>(settings.arm.size());
+  std::size_t chambers = 0;
+  for (const auto& segment : settings.actuation.segments) chambers += segment.size();
+
+  // Everything that grows is grown here, so that the loop never has to.
+  pressure_command.shadow = shadow ? 1 : 0;
+  pressure_command.validity_us =
+      static_cast<std::int32_t>(std::lround(1e6 * settings.daemon.lcm.command_validity_s));
+  pressure_command.num_chambers = static_cast<std::int16_t>(chambers);
+  pressure_command.pressure_bar.assign(chambers, 0.0F);
+  torque_command.shadow = pressure_command.shadow;
+  torque_command.validity_us = pressure_command.validity_us;
+  torque_command.num_moments = static_cast<std::int16_t>(chambers);
+  torque_command.torque_nm.assign(chambers, 0.0);
+  status.version = provenance.version;
+  status.configuration_hash = static_cast<std::int64_t>(provenance.configuration_hash);
+  status.seed = static_cast<std::int64_t>(provenance.seed);
+  status.num_segments = static_cast<std::int16_t>(segments);
+  status.num_chambers = static_cast<std::int16_t>(chambers);
+  for (auto* pairs :
+       {&status.u_rad, &status.velocity_radps, &status.reference_u_rad, &status.tau_actuation_nm})
+    pairs->assign(segments, std::vector<float>(2));
+  for (auto* list :
+       {&status.phi_rad, &status.theta_rad, &status.residual_twist_rad, &status.residual_length_m})
+    list->assign(segments, 0.0F);
+  status.pressure_bar.assign(chambers, 0.0F);
+}
+
+void OutputMessages::set_command(std::int64_t tick, const TickOutput& output) noexcept {
+  pressure_command.sequence = torque_command.sequence = tick;
+  for (std::size_t j = 0; j < pressure_command.pressure_bar.size(); ++j)
+    pressure_command.pressure_bar[j] =
+        static_cast<float>(output.pressure_bar[static_cast<Eigen::Index>(j)]);
+  if (by_torque_)
+    std::copy(output.pressure_bar.begin(), output.pressure_bar.end(),
+              torque_command.torque_nm.begin());
+}
+
+void OutputMessages::set_status(std::int64_t tick, const ControlPipeline& pipeline) noexcept {
+  const TickOutput& output = pipeline.output();
+  const FrameCounters& frames = pipeline.counters();
+  const CurvatureEstimate& estimate = pipeline.estimate();
+  status.tick = tick;
+  status.frame_number = output.frame_number;
+  status.mode = static_cast<std::int8_t>(output.mode);
+  status.reason = static_cast<std::int8_t>(output.reason);
+  status.flags = flags_of(output, pressure_command.shadow != 0);
+  status.frame_age_s = static_cast<float>(output.frame_age_s);
+  status.frames_accepted = counter(frames.accepted);
+  status.frames_rejected = counter(frames.rejected() + pipeline.late_frames());
+  status.frames_repeated = counter(frames.repeated);
+  status.frames_missing = counter(frames.missing);
+  put_pairs(output.motion.u_rad, status.u_rad);
+  put_pairs(output.motion.velocity_radps, status.velocity_radps);
+  put_pairs(output.reference.u, status.reference_u_rad);
+  put_pairs(output.tau_actuation_nm, status.tau_actuation_nm);
+  for (std::size_t i = 0; i < status.theta_rad.size(); ++i) {
+    const float x = status.u_rad[i][0];
+    const float y = status.u_rad[i][1];
+    status.phi_rad[i] = std::atan2(y, x);
+    status.theta_rad[i] = std::hypot(x, y);
+    status.residual_twist_rad[i] = static_cast<float>(estimate.twist_rad[i]);
+    status.residual_length_m[i] = static_cast<float>(estimate.length_error_m[i]);
+  }
+  status.pressure_bar = pressure_command.pressure_bar;
+}
+
+}  // namespace softarm
