@@ -96,6 +96,11 @@ class SchemaVisitor {
     integer(field, wide);
     value = static_cast<int>(wide);
   }
+  void vector3(const Field& field, Eigen::Vector3d& value) {
+    std::vector<double> values(value.data(), value.data() + 3);
+    numbers(field, {Shape::Kind::list, 3}, values);
+    value = Eigen::Map<const Eigen::Vector3d>(values.data());
+  }
   template <typename Enum>
   void choice(const Field& field, std::span<const char* const> names, Enum& value) {
     int index = static_cast<int>(value);

@@ -86,12 +86,6 @@ inline PairVector3 column_rates(const Curve& f, double ux, double uy, const Dire
           f.q1 * Pair{v.x, v.y} + (f.q2 * v.along) * u};
 }
 
-/// What a generalized force does with a force F on the point: [columns]^T F.
-inline Pair project(const Curve& f, double ux, double uy, const Vector3& force) noexcept {
-  const double stretch = f.p1 * (ux * force.x + uy * force.y) + f.q1 * force.z;
-  return Pair{f.p * force.x + stretch * ux, f.p * force.y + stretch * uy};
-}
-
 /// R = I + c1 [w]x + c2 [w]x^2 of S_i in S_{i-1}, w = (-u_y, u_x, 0), applied in ten operations.
 struct Turn {
   double ux, uy, c0, c1, c2;
@@ -160,13 +154,6 @@ inline PairVector3 column_rates(const Spin& w, double ux, double uy, const Direc
   return {-(Pair{0.0, c1_rate} + (w.c3 * v.y) * u + uy * stretch),
           Pair{c1_rate, 0.0} + (w.c3 * v.x) * u + ux * stretch,
           c2_rate * Pair{-uy, ux} + w.c2 * Pair{-v.y, v.x}};
-}
-
-/// What a generalized force does with a moment M about the segment's tip.
-inline Pair project(const Spin& w, double ux, double uy, const Vector3& moment) noexcept {
-  const double along = w.c3 * (ux * moment.y - uy * moment.x);
-  return Pair{w.c1 * moment.y + along * ux - w.c2 * uy * moment.z,
-              -w.c1 * moment.x + along * uy + w.c2 * ux * moment.z};
 }
 
 }  // namespace softarm

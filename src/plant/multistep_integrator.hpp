@@ -33,6 +33,7 @@ class MultistepIntegrator : public Integrator {
   bool derivative(double t_s, const double* y, double* rate);
   static void keep_message(int, const char*, const char*, char* text, void* self);
   virtual void count(long* steps, long* rejected) const = 0;
+  void forget_counts();  ///< to be called before each restart
 
   StageSolver stages_;
   SUNNonlinearSolver solver_ = nullptr;
@@ -41,9 +42,6 @@ class MultistepIntegrator : public Integrator {
  private:
   // SUNDIALS counts from the last restart.
   std::int64_t steps_before_ = 0, rejected_before_ = 0;
-
- protected:
-  void forget_counts();  ///< to be called before each restart
 };
 
 /// BDF or Adams in Nordsieck's form.

@@ -99,14 +99,18 @@ std::string table(const ModelReport& report) {
                 : "not in this build (liborocos-kdl-dev)");
 }
 
+void write_build(JsonWriter& json, const BenchBuild& build) {
+  json.member("compiler", build.compiler);
+  json.member("flags", build.flags);
+  json.member("instruction_set", build.instruction_set);
+  json.member("processor", build.processor);
+  json.member("load", build.load);
+}
+
 std::string json(const ModelReport& report) {
   JsonWriter json;
   json.open_object();
-  json.member("compiler", report.build.compiler);
-  json.member("flags", report.build.flags);
-  json.member("instruction_set", report.build.instruction_set);
-  json.member("processor", report.build.processor);
-  json.member("load", report.build.load);
+  write_build(json, report.build);
   json.member("kdl", report.build.has_kdl);
   json.key("methods");
   json.open_array();

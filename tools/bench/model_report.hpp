@@ -11,12 +11,16 @@
 
 namespace softarm {
 
+class JsonWriter;
+
 /// The machine and the build: without them no time means anything.
 struct BenchBuild {
   std::string compiler, flags, instruction_set, processor, load;
   bool has_kdl = false;
 };
 BenchBuild bench_build();
+/// Its members into the open object.
+void write_build(JsonWriter& json, const BenchBuild& build);
 
 /// One method over all n.
 struct MethodReport {

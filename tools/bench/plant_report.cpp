@@ -81,11 +81,7 @@ std::string table(const PlantReport& report) {
 std::string json(const PlantReport& report) {
   JsonWriter json;
   json.open_object();
-  json.member("compiler", report.build.compiler);
-  json.member("flags", report.build.flags);
-  json.member("instruction_set", report.build.instruction_set);
-  json.member("processor", report.build.processor);
-  json.member("load", report.build.load);
+  write_build(json, report.build);
   json.member("rounds", report.rounds);
   json.member("duration_s", report.duration_s);
   json.key("trials");

@@ -2,11 +2,8 @@
 #pragma once
 
 #include <gtest/gtest.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
-#include <array>
-#include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -17,26 +14,9 @@
 #include <string>
 #include <vector>
 
+#include "program_output.hpp"
+
 namespace softarm::test {
-
-struct Outcome {
-  int code = -1;
-  std::string text;  ///< standard output and standard error
-};
-
-inline Outcome run(const std::string& arguments) {
-  const std::string command = SOFTARM_BINARY_DIR "/bin/softarm " + arguments + " 2>&1";
-  Outcome outcome;
-  FILE* pipe = popen(command.c_str(), "r");
-  if (pipe == nullptr) return outcome;
-  std::array<char, 4096> buffer;
-  while (std::size_t count = fread(buffer.data(), 1, buffer.size(), pipe)) {
-    outcome.text.append(buffer.data(), count);
-  }
-  const int status = pclose(pipe);
-  outcome.code = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
-  return outcome;
-}
 
 /// One event of a channel.
 template <class Message>

@@ -1,35 +1,20 @@
 // `softarm eval --method augmented` as a user sees it: the polar golden cases, and its refusals.
 #include <gtest/gtest.h>
-#include <sys/wait.h>
 
-#include <array>
 #include <cstdio>
 #include <fstream>
 #include <string>
 
+#include "program_output.hpp"
 #include "unit/model/golden.hpp"
 
 namespace softarm {
 namespace {
 
-struct Outcome {
-  int code;
-  std::string text;
-};
+using test::Outcome;
 
 Outcome run_augmented(const std::string& arguments) {
-  const std::string command = std::string(SOFTARM_BINARY_DIR) +
-                              "/bin/softarm eval --method augmented " + arguments + " 2>&1";
-  Outcome outcome{-1, ""};
-  FILE* pipe = popen(command.c_str(), "r");
-  if (pipe == nullptr) return outcome;
-  std::array<char, 4096> buffer;
-  while (const std::size_t count = std::fread(buffer.data(), 1, buffer.size(), pipe)) {
-    outcome.text.append(buffer.data(), count);
-  }
-  const int status = pclose(pipe);
-  outcome.code = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
-  return outcome;
+  return test::run("eval --method augmented " + arguments);
 }
 
 class EvalAugmented : public ::testing::Test {
