@@ -23,19 +23,13 @@ void per_segment(SchemaVisitor& visitor, const Field& field, ArmParameters& arm,
   for (std::size_t i = 0; i < values.size(); ++i) arm.segments[i].*member = values[i];
 }
 
-void vector3(SchemaVisitor& visitor, const Field& field, Eigen::Vector3d& value) {
-  std::vector<double> values(value.data(), value.data() + 3);
-  visitor.numbers(field, {Shape::Kind::list, 3}, values);
-  value = Eigen::Map<const Eigen::Vector3d>(values.data());
-}
-
 void describe_base(SchemaVisitor& visitor, ArmParameters& arm) {
   static const std::array<const char*, 2> kNames = {"hanging", "standing"};
   static const std::array<Eigen::Matrix3d, 2> kRotations = {
       Eigen::Matrix3d(Eigen::Vector3d(1.0, -1.0, -1.0).asDiagonal()), Eigen::Matrix3d::Identity()};
-  vector3(visitor,
-          {"position_m", "m", "origin of the base frame S_0 in the world", from_to(-1e3, 1e3)},
-          arm.base_position_m);
+  visitor.vector3(
+      {"position_m", "m", "origin of the base frame S_0 in the world", from_to(-1e3, 1e3)},
+      arm.base_position_m);
   visitor.matrix_or_word(
       {"rotation", "",
        "of S_0 in the world: hanging diag(1, -1, -1), standing (identity), or a 3 x 3 matrix; the "
@@ -119,8 +113,8 @@ void describe_arm(SchemaVisitor& visitor, ArmParameters& arm) {
       kActuationModels, arm.actuation);
   visitor.section({"base", "", "where the arm is mounted"}, SectionKind::plain,
                   [&] { describe_base(visitor, arm); });
-  vector3(visitor, {"gravity_mps2", "m/s^2", "in the world frame", from_to(-100.0, 100.0)},
-          arm.gravity_mps2);
+  visitor.vector3({"gravity_mps2", "m/s^2", "in the world frame", from_to(-100.0, 100.0)},
+                  arm.gravity_mps2);
 }
 
 void describe_actuation(SchemaVisitor& visitor, ActuationSettings& actuation, int segments) {
@@ -221,9 +215,10 @@ void describe_control(SchemaVisitor& visitor, ControllerSettings& control, int s
       {"valve_lag_s", "s", "first-order lag inverted on what depends on the reference alone",
        from_to(0.0, 5.0)},
       control.valve_lag_s);
-  visitor.number({"delay_s", "s", "dead time assumed by the check of the gains at load time",
-                  from_to(0.0, 5.0)},
-                 control.delay_s);
+  visitor.number(
+      {"delay_s", "s", "dead time of valves and tubes, for the check of the gains at load time",
+       from_to(0.0, 5.0)},
+      control.delay_s);
   visitor.number(
       {"max_theta_rad", "rad", "soft limit on theta of reference and arm", above_to(0.0, kTwoPi)},
       control.max_theta_rad);

@@ -77,11 +77,22 @@ class StaticReach {
   Eigen::VectorXd zero_;
 };
 
+/// What the configuration declares of the loop, whoever closes it.
+LoopSampling sampling_of(const Experiment& experiment) {
+  const SafetySettings& safety = experiment.daemon.safety;
+  return {.control_period_s = 1.0 / experiment.daemon.rate_hz,
+          .frame_period_s = safety.frame_period_s,
+          .frame_latency_s = safety.frame_latency_s,
+          .filter_bandwidth_radps = experiment.estimation.filter_bandwidth_radps,
+          .dead_time_s = experiment.control.delay_s,
+          .valve_lag_s = experiment.control.valve_lag_s};
+}
+
 }  // namespace
 
 std::vector<std::string> experiment_warnings(const Experiment& experiment) {
-  auto warnings =
-      gain_warnings(experiment.arm, experiment.control, largest_theta_rad(experiment.reference));
+  auto warnings = gain_warnings(experiment.arm, experiment.control, sampling_of(experiment),
+                                largest_theta_rad(experiment.reference));
 
   StaticReach reach(experiment);
   for (std::size_t i = 0; i < experiment.reference.phases.size(); ++i) {

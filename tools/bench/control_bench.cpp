@@ -7,7 +7,6 @@
 #include <memory>
 
 #include "bench/interleaved.hpp"
-#include "bench/sampled_loop.hpp"
 #include "softarm/control/curvature_controller.hpp"
 #include "softarm/control/gain_check.hpp"
 
@@ -99,11 +98,15 @@ double simulated_limit(const Experiment& experiment, double upper) {
   return 0.5 * (low + high);
 }
 
-/// The delay as `softarm check` wants it declared: sensing, half a period of frames and of control,
-/// and the valves' dead time.
-double declared_delay_s(const Experiment& experiment) {
-  return experiment.plant.mocap.latency_s + 0.5 / experiment.plant.mocap.rate_hz +
-         experiment.plant.valves.dead_time_s;
+/// What really happens in the simulated loop.
+LoopSampling sampling_of_plant(const Experiment& experiment) {
+  const MocapSettings& mocap = experiment.plant.mocap;
+  return {.control_period_s = 1.0 / experiment.daemon.rate_hz,
+          .frame_period_s = 1.0 / mocap.rate_hz,
+          .frame_latency_s = mocap.latency_s,
+          .filter_bandwidth_radps = experiment.estimation.filter_bandwidth_radps,
+          .dead_time_s = experiment.plant.valves.dead_time_s,
+          .valve_lag_s = experiment.plant.valves.lag_s};
 }
 
 }  // namespace
@@ -143,22 +146,18 @@ StabilityMap bench_stability(const Experiment& configured, StabilityAxis axis, i
   map.axis = dead ? "dead time [s]" : "valve lag [s]";
   map.values = spread(0.0, dead ? kLongestDead_s : kLongestLag_s, points);
   map.kp_nm_per_rad = spread(kLargestGain / points, kLargestGain, points);
-  const Eigen::VectorXd straight = Eigen::VectorXd::Zero(experiment.arm.dof());
+  const Eigen::VectorXd ones = Eigen::VectorXd::Ones(experiment.arm.dof()), zero = 0.0 * ones;
   for (const double value : map.values) {
     progress(fmt::format("{} {:.4f}", map.axis, value));
     Experiment changed = experiment;
     (dead ? changed.plant.valves.dead_time_s : changed.plant.valves.lag_s) = value;
     changed.control.valve_lag_s = changed.plant.valves.lag_s;
-    changed.control.delay_s = declared_delay_s(changed);
     auto& column = map.simulated.emplace_back();
     for (const double kp : map.kp_nm_per_rad) column.push_back(kick(with_gain(changed, kp)));
     map.simulated_limit.push_back(simulated_limit(changed, 2.0 * kLargestGain));
-    const Experiment unit = with_gain(changed, 1.0);
-    map.sampled_limit.push_back(largest_sampled_factor(unit, straight, 2.0 * kLargestGain));
-    const Eigen::VectorXd kp = Eigen::VectorXd::Ones(straight.size());
-    const Eigen::VectorXd kd = Eigen::VectorXd::Zero(kp.size());
-    map.continuous_limit.push_back(
-        std::min(2.0 * kLargestGain, largest_gain_factor(unit.arm, unit.control, kp, kd)));
+    map.predicted_limit.push_back(
+        std::min(2.0 * kLargestGain,
+                 largest_gain_factor(changed.arm, sampling_of_plant(changed), ones, zero, true)));
   }
   return map;
 }

@@ -40,8 +40,7 @@ struct StabilityMap {
   std::vector<double> values;
   std::vector<double> kp_nm_per_rad;
   std::vector<std::vector<KickedTrial>> simulated;  ///< [value][kp]
-  std::vector<double> sampled_limit;                ///< K_P, linear theory with sampling and filter
-  std::vector<double> continuous_limit;             ///< K_P, the check of `softarm check`
+  std::vector<double> predicted_limit;              ///< K_P, linear theory: as `softarm check`
   std::vector<double> simulated_limit;              ///< K_P, by bisection of simulated runs, to 2 %
 };
 

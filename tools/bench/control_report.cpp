@@ -77,11 +77,10 @@ std::string json(const std::vector<ControlScene>& scenes) {
 std::string table(const std::vector<StabilityMap>& maps) {
   std::string text = "largest stable K_P of the straight arm, N m/rad\n";
   for (const StabilityMap& map : maps) {
-    text += fmt::format("{:<16}{:>12}{:>20}{:>24}\n", map.axis, "simulated", "sampled theory",
-                        "softarm check's theory");
+    text += fmt::format("{:<16}{:>12}{:>12}\n", map.axis, "simulated", "predicted");
     for (std::size_t i = 0; i < map.values.size(); ++i)
-      text += fmt::format("{:<16.4f}{:>12.3f}{:>20.3f}{:>24.3f}\n", map.values[i],
-                          map.simulated_limit[i], map.sampled_limit[i], map.continuous_limit[i]);
+      text += fmt::format("{:<16.4f}{:>12.3f}{:>12.3f}\n", map.values[i], map.simulated_limit[i],
+                          map.predicted_limit[i]);
   }
   return text;
 }
@@ -97,8 +96,7 @@ std::string json(const std::vector<StabilityMap>& maps) {
     write_list(json, "values", map.values);
     write_list(json, "kp_nm_per_rad", map.kp_nm_per_rad);
     write_list(json, "simulated_limit_nm_per_rad", map.simulated_limit);
-    write_list(json, "sampled_limit_nm_per_rad", map.sampled_limit);
-    write_list(json, "continuous_limit_nm_per_rad", map.continuous_limit);
+    write_list(json, "predicted_limit_nm_per_rad", map.predicted_limit);
     json.key("growth_1ps");
     json.open_array();
     for (const auto& column : map.simulated) {

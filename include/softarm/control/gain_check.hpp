@@ -10,19 +10,32 @@
 
 namespace softarm {
 
-/// Largest factor on the gains K_P, K_D with which the loop, linearized about the straight pose at
-/// rest, is stable; 0 if it is unstable without them, at most 1e3. kp_u (N m/rad), kd_u (N m
-/// s/rad): diagonals in u, 2n each. Not for the loop: allocates, solves eigenvalue problems of 6n
-/// states.
-///
-/// The linearized loop of one bending plane is
-///   B s^2 + beta s + k + G_u + H(s) (K_P + K_D s - G_u),   H(s) = e^(-s T) / (tau_v s + 1),
-/// T = delay_s, tau_v = valve_lag_s, G_u the slope of gravity (the controller feeds G back late).
-/// What is approximate: the delay is a Pade approximant of order (3,3) (phase exact to 2e-3 rad up
-/// to w T = 2); B and G_u are those of the straight pose, planes do not couple; sampling and the
-/// velocity filter are not in it unless delay_s counts them. A guide with a margin, not a proof.
-double largest_gain_factor(const ArmParameters& arm, const ControllerSettings& settings,
-                           const Eigen::VectorXd& kp_u, const Eigen::VectorXd& kd_u);
+/// What samples, delays and filters between the motion of the arm and the moments on it.
+struct LoopSampling {
+  double control_period_s = 0.002;
+  double frame_period_s = 0.005;
+  double frame_latency_s = 0.0;  ///< from capture to arrival
+  double filter_bandwidth_radps = 30.0;
+  double dead_time_s = 0.0;  ///< of valves and tubes
+  double valve_lag_s = 0.0;  ///< first order
+};
+
+/// Growth rate (1/s) of the slowest small deviation from the straight pose at rest under feedback
+/// by kp_u (N m/rad) and kd_u (N m s/rad), diagonals in u, 2n each: negative where the loop is
+/// stable. gravity_fed_back: the controller takes G(u) away, as (17) does, as late as all else.
+/// Linearized, planes do not couple, frames and ticks on a common grid; otherwise exact: sampling,
+/// hold, delays, lag and the velocity filter are in it. Not in it: saturation, slew, noise, a bent
+/// arm, `ki`. Not for the loop: allocates, and simulates 13 s.
+/// @throws std::invalid_argument where sizes do not fit
+double loop_growth_1ps(const ArmParameters& arm, const LoopSampling& sampling,
+                       const Eigen::VectorXd& kp_u, const Eigen::VectorXd& kd_u,
+                       bool gravity_fed_back);
+
+/// Largest factor on the gains with which that growth is negative, within 0.1 %; 0 if the loop is
+/// unstable without them, at most 1e3.
+double largest_gain_factor(const ArmParameters& arm, const LoopSampling& sampling,
+                           const Eigen::VectorXd& kp_u, const Eigen::VectorXd& kd_u,
+                           bool gravity_fed_back);
 
 /// Slope of G at u (2n x 2n, N m/rad), by central differences. Not for the loop: allocates.
 Eigen::MatrixXd gravity_slope(const ArmParameters& arm, const Eigen::VectorXd& u);
@@ -36,9 +49,9 @@ Eigen::Matrix3d tip_compliance(const ArmParameters& arm, const Eigen::VectorXd& 
                                const Eigen::VectorXd& kp_u, bool gravity_fed_back);
 
 /// Texts for a person, none if all is well: gains (in polar coordinates K_P,phi / theta^2 at
-/// `theta_rad`, the largest theta that the reference reaches) above what delay_s and valve_lag_s
-/// allow, or within a factor 1.25 of it.
+/// `theta_rad`, the largest theta that the reference reaches) above what the loop leaves stable, or
+/// within a factor 1.25 of it.
 std::vector<std::string> gain_warnings(const ArmParameters& arm, const ControllerSettings& settings,
-                                       double theta_rad);
+                                       const LoopSampling& sampling, double theta_rad);
 
 }  // namespace softarm
