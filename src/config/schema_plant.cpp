@@ -47,12 +47,6 @@ void describe_mocap(SchemaVisitor& visitor, MocapSettings& mocap) {
   visitor.flag({"noise_on_base", "", "the base is measured with noise too"}, mocap.noise_on_base);
 }
 
-void vector3(SchemaVisitor& visitor, const Field& field, Eigen::Vector3d& value) {
-  std::vector<double> values(value.data(), value.data() + 3);
-  visitor.numbers(field, {Shape::Kind::list, 3}, values);
-  value = Eigen::Map<const Eigen::Vector3d>(values.data());
-}
-
 void describe_valves(SchemaVisitor& visitor, ValveSettings& valves) {
   visitor.number(
       {"lag_s", "s", "time constant; 0: the command is the pressure", from_to(0.0, 10.0)},
@@ -76,8 +70,8 @@ void describe_load(SchemaVisitor& visitor, ExternalLoad& load, int segments) {
   visitor.integer({"segment", "", "on whose end it acts; 0: the tip",
                    from_to(0, static_cast<double>(segments))},
                   load.segment);
-  vector3(visitor, {"force_n", "N", "world frame", from_to(-1e6, 1e6)}, load.force_n);
-  vector3(visitor, {"moment_nm", "N m", "world frame", from_to(-1e6, 1e6)}, load.moment_nm);
+  visitor.vector3({"force_n", "N", "world frame", from_to(-1e6, 1e6)}, load.force_n);
+  visitor.vector3({"moment_nm", "N m", "world frame", from_to(-1e6, 1e6)}, load.moment_nm);
   visitor.choice({"shape", "", "constant, or a blow: half a sine over the duration"}, kShapes,
                  load.shape);
   visitor.number({"start_s", "s", "when it begins", from_to(0.0, kMany)}, load.start_s);
@@ -87,8 +81,7 @@ void describe_load(SchemaVisitor& visitor, ExternalLoad& load, int segments) {
 /// What the world does to the arm.
 void describe_world(SchemaVisitor& visitor, PlantSettings& plant) {
   const int n = plant.arm.size();
-  vector3(
-      visitor,
+  visitor.vector3(
       {"tip_force_n", "N", "constant external force at the tip, world frame", from_to(-1e4, 1e4)},
       plant.tip_force_n);
   if (visitor.reading() || !plant.loads.empty()) {
@@ -106,8 +99,8 @@ void describe_world(SchemaVisitor& visitor, PlantSettings& plant) {
       {"base_motion", "", "the base is carried to and fro, without turning"}, SectionKind::plain,
       [&] {
         BaseMotion& motion = plant.base_motion;
-        vector3(visitor, {"amplitude_m", "m", "world frame", from_to(-10.0, 10.0)},
-                motion.amplitude_m);
+        visitor.vector3({"amplitude_m", "m", "world frame", from_to(-10.0, 10.0)},
+                        motion.amplitude_m);
         visitor.number({"frequency_hz", "Hz", "of the sine", from_to(0.0, 1000.0)},
                        motion.frequency_hz);
         visitor.number({"phase_rad", "rad", "at t = 0", from_to(-100.0, 100.0)}, motion.phase_rad);
@@ -216,24 +209,30 @@ void describe_plant(SchemaVisitor& visitor, Experiment& experiment) {
   describe_world(visitor, plant);
   static const std::array<const char*, 7> kMethods = {"sdirk2",    "cash4",       "sdirk4", "erk",
                                                       "cvode_bdf", "cvode_adams", "ida"};
-  if (visitor.reading() && plant.kind != PlantKind::pcc) {
-    // Arms of many light parts answer a step of the torque within microseconds. Error control that
-    // resolves this costs a hundred times more and gains nothing that a motion shows.
-    plant.method = IntegratorMethod::sdirk2;
-    plant.absolute_tolerance = 1e-6;
+  visitor.choice({"integrator", "",
+                  "method of SUNDIALS: one-step and implicit (sdirk2, cash4, sdirk4) or explicit "
+                  "(erk), multistep (the others)"},
+                 kMethods, plant.method);
+  if (visitor.reading() && plant.method != IntegratorMethod::sdirk2) {
+    // Whoever chooses another method wants its accuracy.
+    plant.relative_tolerance = 1e-6;
+    plant.absolute_tolerance = 1e-8;
+    plant.max_step_s = 0.0;
   }
-  visitor.choice(
-      {"integrator", "",
-       "method of SUNDIALS: one-step and implicit (sdirk2, cash4, sdirk4) or explicit "
-       "(erk), multistep (the others); left out: cash4, or sdirk2 where kind is not pcc"},
-      kMethods, plant.method);
-  visitor.number({"relative_tolerance", "", "of the integrator", from_to(1e-13, 1e-2)},
-                 plant.relative_tolerance);
+  visitor.number(
+      {"relative_tolerance", "",
+       "of the integrator; left out: 1e-3, or 1e-6 where it is not sdirk2", from_to(1e-13, 1e-2)},
+      plant.relative_tolerance);
   visitor.number({"absolute_tolerance", "rad",
-                  "of the integrator, for u; 1000 times that for u' in rad/s; left out: 1e-8, or "
-                  "1e-6 where kind is not pcc",
+                  "of the integrator, for u; 1000 times that for u' in rad/s; left out: 1e-4, or "
+                  "1e-8 where it is not sdirk2",
                   from_to(1e-15, 1e-2)},
                  plant.absolute_tolerance);
+  visitor.number({"max_step_s", "s",
+                  "longest step, 0: as the tolerances allow; left out: 1 ms, or 0 where the "
+                  "integrator is not sdirk2",
+                  from_to(0.0, 1.0)},
+                 plant.max_step_s);
 }
 
 }  // namespace softarm

@@ -110,6 +110,7 @@ ArkodeIntegrator::ArkodeIntegrator(SecondOrderSystem& system, const IntegratorSe
   check(ARKStepSetMaxNumSteps(arkode_, kMaxSteps), "ARKStepSetMaxNumSteps");
   check(ARKStepSetMaxErrTestFails(arkode_, kMaxErrorTestFailures), "ARKStepSetMaxErrTestFails");
   check(ARKStepSetMinStep(arkode_, kMinStep_s), "ARKStepSetMinStep");
+  check(ARKStepSetMaxStep(arkode_, settings.max_step_s), "ARKStepSetMaxStep");
 }
 
 void ArkodeIntegrator::set_method() {

@@ -99,6 +99,7 @@ IntegratorSettings integrator_settings(const PlantSettings& settings) {
           .relative_tolerance = settings.relative_tolerance,
           .absolute_tolerance = settings.absolute_tolerance,
           .absolute_tolerance_velocity = kVelocityTolerance * settings.absolute_tolerance,
+          .max_step_s = settings.max_step_s,
           .account_energy = settings.account_energy};
 }
 

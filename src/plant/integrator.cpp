@@ -41,6 +41,7 @@ Integrator::Integrator(SecondOrderSystem& system, const IntegratorSettings& sett
   expect_positive(settings.relative_tolerance, "relative_tolerance");
   expect_positive(settings.absolute_tolerance, "absolute_tolerance");
   expect_positive(settings.absolute_tolerance_velocity, "absolute_tolerance_velocity");
+  if (settings.max_step_s != 0.0) expect_positive(settings.max_step_s, "max_step_s");
   saved_.setZero(length());
   y_.reset(N_VNew_Serial(length(), context_.get()));
   N_VConst(0.0, y_.get());

@@ -19,6 +19,7 @@ struct IntegratorSettings {
   double relative_tolerance = 1e-6;
   double absolute_tolerance = 1e-8;           ///< of x and of energies (J)
   double absolute_tolerance_velocity = 1e-5;  ///< of v
+  double max_step_s = 0.0;                    ///< 0: as long as the tolerances allow
   bool account_energy = false;                ///< integrate work and dissipation along
   /// What drives the system is smooth for all time: multistep methods may then step past the end
   /// of a call and interpolate. One-step methods do not care.

@@ -127,6 +127,7 @@ CvodeIntegrator::CvodeIntegrator(SecondOrderSystem& system, const IntegratorSett
   check(CVodeSetMaxNumSteps(cvode_, kMaxSteps), "CVodeSetMaxNumSteps");
   check(CVodeSetMaxErrTestFails(cvode_, kMaxErrorTestFailures), "CVodeSetMaxErrTestFails");
   check(CVodeSetMinStep(cvode_, kMinStep_s), "CVodeSetMinStep");
+  check(CVodeSetMaxStep(cvode_, settings.max_step_s), "CVodeSetMaxStep");
 }
 
 CvodeIntegrator::~CvodeIntegrator() { CVodeFree(&cvode_); }
@@ -202,6 +203,7 @@ IdaIntegrator::IdaIntegrator(SecondOrderSystem& system, const IntegratorSettings
   check(IDASetMaxNumSteps(ida_, kMaxSteps), "IDASetMaxNumSteps");
   check(IDASetMaxErrTestFails(ida_, kMaxErrorTestFailures), "IDASetMaxErrTestFails");
   check(IDASetMinStep(ida_, kMinStep_s), "IDASetMinStep");
+  check(IDASetMaxStep(ida_, settings.max_step_s), "IDASetMaxStep");
 }
 
 IdaIntegrator::~IdaIntegrator() { IDAFree(&ida_); }

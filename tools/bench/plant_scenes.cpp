@@ -152,6 +152,7 @@ PlantRun run_plant(const PlantSettings& settings, Scene scene, const Trial& tria
                                  .relative_tolerance = trial.tolerance,
                                  .absolute_tolerance = absolute,
                                  .absolute_tolerance_velocity = kVelocityTolerance * absolute,
+                                 .max_step_s = trial.max_step_s,
                                  .smooth_input = scene != Scene::held});
     const double start_s = processor_time_s();
     solver->reset(0.0, x, rest);

@@ -38,6 +38,7 @@ struct Trial {
   IntegratorMethod method = IntegratorMethod::cash4;
   double tolerance = 1e-6;
   double absolute_tolerance = 0.0;  ///< rad; 0: 1e-2 times `tolerance`
+  double max_step_s = 0.0;          ///< 0: as the tolerances allow
   bool plain_cvode = false;         ///< CVODE BDF as most would set it up: see PlainCvode
 };
 

@@ -2,7 +2,7 @@
 import numpy as np
 from matplotlib.lines import Line2D
 
-from .style import CATEGORY, ESTIMATE, INK, finish, plt
+from .style import CATEGORY, INK, finish, plt
 
 THEORY_STYLE = {"color": INK, "linestyle": (0, (4, 2)), "linewidth": 1.0}
 LAW_COLOUR = {"(17)": CATEGORY[0], "statics and PI": CATEGORY[4], "PI alone": CATEGORY[1],
@@ -98,16 +98,14 @@ def stability(results, path):
         axes.scatter(x[stable], y[stable], s=12 + 3 * np.clip(-growth[stable], 0, 12), color=CATEGORY[2], linewidth=0)
         axes.scatter(x[~stable], y[~stable], s=20, marker="x", color=CATEGORY[1], linewidth=1)
         axes.plot(values, each["simulated_limit_nm_per_rad"], color=CATEGORY[0], linewidth=1.6)
-        axes.plot(values, each["sampled_limit_nm_per_rad"], **THEORY_STYLE)
-        axes.plot(values, each["continuous_limit_nm_per_rad"], color=ESTIMATE, linewidth=1.4)
+        axes.plot(values, each["predicted_limit_nm_per_rad"], **THEORY_STYLE)
         axes.set_ylim(0, 1.15 * gains[-1])
         axes.set_xlabel(each["axis"].replace("[s]", "[ms]"))
         axes.set_ylabel("$K_P$ [N m/rad]")
     handles = [Line2D([], [], color=CATEGORY[2], marker="o", linestyle="", markersize=5, label="a blow fades"),
                Line2D([], [], color=CATEGORY[1], marker="x", linestyle="", markersize=5, label="it does not"),
                Line2D([], [], color=CATEGORY[0], linewidth=1.6, label="limit, simulated"),
-               Line2D([], [], label="sampled theory", **THEORY_STYLE),
-               Line2D([], [], color=ESTIMATE, linewidth=1.4, label="softarm check's theory")]
+               Line2D([], [], label="predicted, as softarm check does", **THEORY_STYLE)]
     finish(figure, path, "Stability", handles)
 
 
@@ -142,10 +140,47 @@ def control(results, path):
     finish(figure, path, "What a scene needs: control rate, terms of (17)", row_gap=0.7, left_margin=1.35, column_gap=1.5)
 
 
+METHOD_STYLE = {"sdirk2": (CATEGORY[0], "o-"), "cash4": (CATEGORY[2], "s-"), "sdirk4": (CATEGORY[3], "^-"),
+                "erk": (CATEGORY[4], "v-"), "cvode_bdf": (CATEGORY[1], "o--"), "cvode_adams": (CATEGORY[6], "s--"),
+                "ida": (CATEGORY[5], "^--")}
+DEFAULT_STYLE = {"color": CATEGORY[0], "marker": "D", "markersize": 6, "linestyle": ""}
+PLAIN_STYLE = {"color": INK, "marker": "*", "markersize": 9, "linestyle": ""}  # as most would set it up
+
+
+def plants(results, path):
+    """Work and precision: real-time factor over error, a curve a method, a point a tolerance."""
+    trials = [trial for trial in results["plant"]["trials"] if trial["error_rad"] and trial["real_time_factor"]]
+    names, scenes = (list(dict.fromkeys(trial[key] for trial in trials)) for key in ("plant", "scene"))
+    figure, grid = plt.subplots(len(scenes), len(names), figsize=(12, 8), squeeze=False)
+    for row, scene in enumerate(scenes):
+        for column, name in enumerate(names):
+            axes = grid[row][column]
+            here = [trial for trial in trials if (trial["plant"], trial["scene"]) == (name, scene)]
+            for method, (colour, style) in METHOD_STYLE.items():
+                points = [trial for trial in here if trial["method"] == method]
+                axes.plot([trial["error_rad"] for trial in points], [trial["real_time_factor"] for trial in points], style,
+                          color=colour, markersize=3.5, linewidth=1)
+            for method, style in (("default", DEFAULT_STYLE), ("cvode plain", PLAIN_STYLE)):
+                points = [trial for trial in here if trial["method"].startswith(method)]
+                axes.plot([trial["error_rad"] for trial in points], [trial["real_time_factor"] for trial in points], **style)
+            axes.set_xscale("log")
+            axes.set_yscale("log")
+            axes.minorticks_off()
+            axes.set_title(f"{name}, {scene}")
+            if column == 0:
+                axes.set_ylabel("times real time")
+            if row == len(scenes) - 1:
+                axes.set_xlabel("largest error [rad]")
+    handles = [Line2D([], [], color=colour, marker=style[0], linestyle=style[1:], markersize=3.5, label=method)
+               for method, (colour, style) in METHOD_STYLE.items()]
+    handles += [Line2D([], [], label="the default", **DEFAULT_STYLE), Line2D([], [], label="plain CVODE", **PLAIN_STYLE)]
+    finish(figure, path, "Simulated arms", handles, row_gap=0.5)
+
+
 def draw_all(results, folder):
     """Draws every figure into the folder and returns their paths."""
     paths = []
-    for draw in (claims, stability, control):
+    for draw in (claims, stability, control, plants):
         path = folder / f"{draw.__name__}.png"
         draw(results, path)
         paths.append(path)

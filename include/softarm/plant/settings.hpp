@@ -133,9 +133,12 @@ struct PlantSettings {
   std::vector<ExternalLoad> loads;
   std::vector<double> payload_kg;  ///< point masses on the segments' ends; empty: none, else n
   BaseMotion base_motion;
-  IntegratorMethod method = IntegratorMethod::cash4;
-  double relative_tolerance = 1e-6;  ///< of the SUNDIALS integrator
-  double absolute_tolerance = 1e-8;  ///< of u (rad); kVelocityTolerance times that of u' (rad/s)
+  IntegratorMethod method = IntegratorMethod::sdirk2;
+  /// Of the integrator. The defaults are for closed loops: tolerances that see no more of a sampled
+  /// torque than a motion shows, and steps short enough to be far more exact than these.
+  double relative_tolerance = 1e-3;
+  double absolute_tolerance = 1e-4;  ///< of u (rad); kVelocityTolerance times that of u' (rad/s)
+  double max_step_s = 1e-3;          ///< 0: as long as the tolerances allow
   bool account_energy = false;       ///< integrate work and dissipation along
   std::uint64_t seed = 1;
 };

@@ -5,6 +5,7 @@
 #include <numbers>
 #include <vector>
 
+#include "numerics/plant/balanced_run.hpp"
 #include "softarm/plant/arm_plant.hpp"
 #include "unit/plant/paper_arm.hpp"
 
@@ -50,6 +51,14 @@ PlantSettings with_damping(PlantSettings settings, double factor) {
   return settings;
 }
 
+/// One segment with a moment that bends it beyond pi.
+PlantSettings by_torque(PlantKind kind, int parts) {
+  PlantSettings settings = arm_of(kind, 1, parts);
+  set_torque_actuation(settings.actuation, 1, 10.0);
+  settings.valves.supply_pressure_bar = 10.0;
+  return settings;
+}
+
 /// The arm of section VI: 24 links, 1 m, 1 kg.
 PlantSettings section_six(MassModel mass = MassModel::distributed) {
   PlantSettings settings = arm_of(PlantKind::links, 4, 6, 0.6);
@@ -85,37 +94,19 @@ std::vector<KindCase> cases() {
       {"links_blow", with_blow(arm_of(kLinks, 3, 6)), 0.3, {}},
       {"pcc_dead_time", with_dead_time(arm_of(kPcc, 3, 1)), 0.3, one_side(3)},
       {"links_dead_time", with_dead_time(arm_of(kLinks, 3, 6)), 0.3, one_side(3)},
+      {"refined_through_pi", by_torque(kRefined, 6), 0.5, {0.0, 2.4}},
+      {"links_through_pi", by_torque(kLinks, 6), 0.5, {0.0, 2.4}},
       {"twenty_four_links", section_six(), 0.5, one_side(4)},
       {"twenty_four_point_links", section_six(MassModel::point), 0.5, one_side(4)},
   };
 }
 
-struct Outcome {
-  SegmentVector u;
-  double imbalance_j = 0.0;  // largest
-  IntegratorCounters counters;
-};
-
 Outcome run(const KindCase& example, IntegratorMethod method, double relative, double absolute) {
   PlantSettings settings = example.settings;
-  settings.account_energy = true;
   settings.method = method;
   settings.relative_tolerance = relative;
   settings.absolute_tolerance = absolute;
-  ArmPlant plant(settings);
-  if (!example.pressures.empty()) plant.command(example.pressures);
-  const PlantEnergies start = plant.energies();
-  Outcome result;
-  for (int k = 1; k <= 20; ++k) {
-    plant.advance(example.duration_s * k / 20);
-    const PlantEnergies now = plant.energies();
-    const double stored = now.kinetic + now.potential - start.kinetic - start.potential;
-    result.imbalance_j =
-        std::max(result.imbalance_j, std::abs(stored - now.supplied + now.dissipated));
-  }
-  result.u = plant.u_rad();
-  result.counters = plant.counters();
-  return result;
+  return balanced_run(settings, example.pressures, example.duration_s, 20);
 }
 
 class KindsHardCases : public ::testing::TestWithParam<KindCase> {};

@@ -15,6 +15,10 @@ inline PlantSettings paper_arm(MassModel mass = MassModel::distributed, int segm
   PlantSettings settings;
   settings.arm.segments.assign(static_cast<std::size_t>(segments), SegmentParameters{});
   settings.arm.mass = mass;
+  settings.method = IntegratorMethod::cash4;
+  settings.relative_tolerance = 1e-6;
+  settings.absolute_tolerance = 1e-8;
+  settings.max_step_s = 0.0;
   std::vector<Chamber> chambers;
   for (int j = 0; j < 4; ++j) chambers.push_back({.angle_rad = j * std::numbers::pi / 2});
   settings.actuation.segments.assign(static_cast<std::size_t>(segments), chambers);
