@@ -79,10 +79,10 @@ void Replay::begin_run(const tick_record_t& first) {
         "the log was recorded with configuration {}, this one is {}; --any-configuration replays "
         "all the same",
         hash_text(recorded), hash_text(experiment_.hash)));
-  // Of an earlier run, unless it can belong to what begins now.
+  // What waits from an earlier run, which the same clock tells from this one.
   const auto forget = [&first](auto& window) {
     for (auto& each : window)
-      if (each.tick > first.tick) each.tick = 0;
+      if (each.message.time_us < first.first_ns / 1000) each.tick = 0;
   };
   forget(*pressures_);
   forget(*torques_);
