@@ -91,40 +91,4 @@ double Valves::remaining(double ahead_s) const noexcept {
   return lag_s_ == 0.0 ? 0.0 : std::exp(-ahead_s / lag_s_);
 }
 
-CommandExpiry::CommandExpiry(int chambers)
-    : set_points_bar_(Eigen::VectorXd::Zero(checked_count(chambers))) {}
-
-CommandVerdict CommandExpiry::receive(const PressureCommand& command,
-                                      std::int64_t arrival_ns) noexcept {
-  update(arrival_ns);
-  if (command.shadow) {
-    return CommandVerdict::shadow;
-  }
-  const auto finite = [](double pressure) { return std::isfinite(pressure); };
-  if (command.validity_ns <= 0 || command.sequence < 0 ||
-      command.pressure_bar.size() != static_cast<std::size_t>(set_points_bar_.size()) ||
-      !std::all_of(command.pressure_bar.begin(), command.pressure_bar.end(), finite)) {
-    return CommandVerdict::malformed;
-  }
-  if (command.sequence <= sequence_) {
-    return CommandVerdict::older;
-  }
-  sequence_ = command.sequence;
-  // Saturating: a validity of "for ever" must not wrap around into the past.
-  expires_ns_ =
-      command.validity_ns < kNever - 1 - arrival_ns ? arrival_ns + command.validity_ns : kNever - 1;
-  std::copy(command.pressure_bar.begin(), command.pressure_bar.end(), set_points_bar_.data());
-  return CommandVerdict::in_force;
-}
-
-bool CommandExpiry::update(std::int64_t now_ns) noexcept {
-  if (now_ns < expires_ns_ || vented()) {
-    return false;
-  }
-  expires_ns_ = kNever;
-  sequence_ = kNoSequence;
-  set_points_bar_.setZero();
-  return true;
-}
-
 }  // namespace softarm

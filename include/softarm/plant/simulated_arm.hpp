@@ -5,10 +5,10 @@
 #include <cstdint>
 #include <vector>
 
+#include "softarm/actuation/command_expiry.hpp"
 #include "softarm/plant/arm_plant.hpp"
 #include "softarm/plant/mocap_simulator.hpp"
 #include "softarm/plant/settings.hpp"
-#include "softarm/plant/valves.hpp"
 
 namespace softarm {
 

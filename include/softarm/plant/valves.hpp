@@ -1,4 +1,4 @@
-// The valve side of the arm: whose command is in force, and how pressures follow it.
+// The valves of the simulated arm: how pressures follow what is commanded.
 #pragma once
 
 #include <Eigen/Core>
@@ -62,57 +62,6 @@ class Valves {
   double resolution_bar_;
   Eigen::VectorXd pressure_bar_;
   Eigen::VectorXd command_bar_;
-};
-
-/// What the valve side makes of a command.
-enum class CommandVerdict {
-  in_force,   ///< its set points hold until a newer command comes or it expires
-  older,      ///< its sequence number is not above that of the command in force
-  shadow,     ///< computed for inspection, not for the valves
-  malformed,  ///< wrong number of pressures, a pressure that is not finite, or no validity
-};
-
-/// Set points for every valve, as a controller sends them.
-struct PressureCommand {
-  std::int64_t sequence = 0;     ///< counts up by one a command
-  std::int64_t validity_ns = 0;  ///< how long it may be held after its arrival
-  bool shadow = false;
-  std::span<const double>
-      pressure_bar;  ///< above ambient; segment by segment, in each the configured chamber order
-};
-
-/// Decides which command is in force, so that the arm vents by itself when its controller falls
-/// silent: no clock of its own, time comes in as an argument.
-///
-/// Before the first command and from the expiry of the last one on, every set point is 0 bar. After
-/// an expiry a sender may start its sequence numbers anew. Nothing allocates or throws after
-/// construction.
-class CommandExpiry {
- public:
-  static constexpr std::int64_t kNoSequence = -1;  ///< `sequence()` while vented
-  static constexpr std::int64_t kNever = INT64_MAX;
-
-  /// @param chambers number of set points in a command, >= 0 (std::invalid_argument otherwise).
-  explicit CommandExpiry(int chambers);
-
-  /// Takes a command that arrived at `arrival_ns` (times never go back).
-  CommandVerdict receive(const PressureCommand& command, std::int64_t arrival_ns) noexcept;
-
-  /// Lets a command expire whose validity ended at or before `now_ns`. Returns true if that vented
-  /// the valves just now.
-  bool update(std::int64_t now_ns) noexcept;
-
-  bool vented() const noexcept { return expires_ns_ == kNever; }    ///< no command is in force
-  std::int64_t expires_ns() const noexcept { return expires_ns_; }  ///< kNever while vented
-  std::int64_t sequence() const noexcept { return sequence_; }      ///< of the command in force
-  const Eigen::VectorXd& set_points_bar() const noexcept {
-    return set_points_bar_;
-  }  ///< zero while vented
-
- private:
-  std::int64_t expires_ns_ = kNever;
-  std::int64_t sequence_ = kNoSequence;
-  Eigen::VectorXd set_points_bar_;
 };
 
 }  // namespace softarm
