@@ -11,7 +11,8 @@ configure_package_config_file(${CMAKE_CURRENT_LIST_DIR}/softarmConfig.cmake.in $
   INSTALL_DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/softarm)
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/softarmConfigVersion.cmake COMPATIBILITY SameMinorVersion)
 install(FILES ${PROJECT_BINARY_DIR}/softarmConfig.cmake ${PROJECT_BINARY_DIR}/softarmConfigVersion.cmake
-  ${PROJECT_SOURCE_DIR}/tools/cmake/SoftarmLcm.cmake DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/softarm)
+  ${PROJECT_SOURCE_DIR}/tools/cmake/SoftarmLcm.cmake ${PROJECT_SOURCE_DIR}/tools/cmake/SoftarmModbus.cmake
+  DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/softarm)
 install(PROGRAMS tools/plot_run.py DESTINATION ${CMAKE_INSTALL_DATADIR}/softarm)
 install(DIRECTORY tools/plotting DESTINATION ${CMAKE_INSTALL_DATADIR}/softarm
   FILES_MATCHING PATTERN "*.py" PATTERN "__pycache__" EXCLUDE)

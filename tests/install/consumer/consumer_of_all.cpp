@@ -4,6 +4,7 @@
 #include <softarm/actuation/pressure_allocator.hpp>
 #include <softarm/config/load.hpp>
 #include <softarm/daemon/control_pipeline.hpp>
+#include <softarm/modbus/modbus_terminal.hpp>
 #include <softarm/plant/arm_plant.hpp>
 #include <softarm/transport/lcm_node.hpp>
 #include <softarm_messages/pressure_command_t.hpp>
@@ -13,6 +14,7 @@ int main(int, char** arguments) try {
   softarm::ArmPlant plant(experiment.plant);
   plant.advance(0.01);
   softarm::LcmNode node("memq://");
+  const softarm::ModbusTerminal terminal(experiment.valves);
   softarm_messages::pressure_command_t command;
   command.num_chambers = 0;
   std::printf("%s: %d chambers, %d bytes in a message\n", experiment.name.c_str(), plant.chambers(),

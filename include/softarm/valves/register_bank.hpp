@@ -1,0 +1,20 @@
+// What stands behind a Modbus server: registers, and who may touch which.
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+namespace softarm {
+
+/// 65536 holding registers, by address. Nothing throws.
+class RegisterBank {
+ public:
+  virtual ~RegisterBank() = default;
+  virtual std::span<std::uint16_t, 65536> registers() noexcept = 0;
+  virtual bool readable(int address, int count) const noexcept = 0;
+  virtual bool writable(int address, int count) const noexcept = 0;
+  /// After a request was served; `count` registers from `address` were written (0: it only read).
+  virtual void served(int address, int count) noexcept = 0;
+};
+
+}  // namespace softarm

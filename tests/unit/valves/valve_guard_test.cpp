@@ -1,0 +1,384 @@
+// The guard stepped through time by hand: what is written in every cycle, whatever happens.
+#include "softarm/valves/valve_guard.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <memory>
+#include <vector>
+
+#include "counted_malloc.hpp"
+
+namespace softarm {
+namespace {
+
+constexpr std::int64_t kMs = 1'000'000;
+constexpr std::int64_t kPeriod = 5 * kMs;
+
+class Guard : public ::testing::Test {
+ protected:
+  void SetUp() override { make(); }
+  void make() {
+    settings.chambers = 2;
+    settings.driver.registers = register_preset(TerminalKind::cpx_vppm);
+    guard = std::make_unique<ValveGuard>(settings);
+  }
+
+  /// A command as a controller at the cycle's rate sends it.
+  void command(double a, double b, std::int64_t validity_ns = 100 * kMs) {
+    pressures = {a, b};
+    guard->command({.sequence = sequence++, .validity_ns = validity_ns, .pressure_bar = pressures},
+                   now);
+  }
+
+  /// One cycle with a terminal that does `result`; its valves follow at once unless `stuck`.
+  ValveAction cycle(LinkResult result = LinkResult::ok) {
+    now += kPeriod;
+    guard->wake(now);
+    if (commanding) command(wanted[0], wanted[1]);
+    const ValveAction action = guard->next(now);
+    if (action == ValveAction::connect) guard->connected(reachable, now);
+    if (action == ValveAction::secure) guard->secured(secure_result, as_written, now);
+    if (action == ValveAction::exchange) {
+      written = guard->set_points_bar();
+      EXPECT_GE(written.minCoeff(), 0.0);
+      EXPECT_LE(written.maxCoeff(), settings.max_pressure_bar);
+      if (guard->state() != ValveState::running) {
+        EXPECT_TRUE(written.isZero());
+      }
+      if (result == LinkResult::ok) {
+        read_back.has_echo = true;
+        read_back.echo_bar = written;
+        read_back.actual_bar = written;
+        if (stuck_at >= 0) read_back.actual_bar[0] = stuck_at;
+      }
+      guard->exchanged(result, read_back, now);
+    }
+    return action;
+  }
+  /// Cycles until `state`, at most `limit`.
+  bool reach(ValveState state, int limit = 2000) {
+    for (int k = 0; k < limit && guard->state() != state; ++k) cycle();
+    return guard->state() == state;
+  }
+  void run() {
+    commanding = true;
+    ASSERT_TRUE(reach(ValveState::running));
+    for (int k = 0; k < 100; ++k) cycle();
+    ASSERT_DOUBLE_EQ(written[0], wanted[0]);
+  }
+
+  ValveGuardSettings settings;
+  std::unique_ptr<ValveGuard> guard;
+  std::int64_t now = 1000 * kMs;
+  std::int64_t sequence = 0;
+  std::array<double, 2> pressures{}, wanted{0.5, 1.0};
+  bool commanding = false, reachable = true, as_written = true;
+  LinkResult secure_result = LinkResult::ok;
+  double stuck_at = -1.0;
+  ReadBack read_back{2};
+  Eigen::VectorXd written;
+};
+
+TEST_F(Guard, WritesNoPressureBeforeTheTimeoutReadsBack) {
+  commanding = true;
+  as_written = false;
+  for (int k = 0; k < 5000; ++k) {
+    ASSERT_NE(cycle(), ValveAction::exchange);
+    if (guard->state() == ValveState::disconnected && k > 2) {
+      ASSERT_EQ(guard->reason(), ValveReason::failsafe_refused);
+    }
+  }
+  secure_result = LinkResult::exception_reply;
+  as_written = true;
+  for (int k = 0; k < 5000; ++k) ASSERT_NE(cycle(), ValveAction::exchange);
+  secure_result = LinkResult::ok;
+  EXPECT_TRUE(reach(ValveState::running));
+}
+
+TEST_F(Guard, StartsWithZeroAndRisesGently) {
+  commanding = true;
+  ASSERT_TRUE(reach(ValveState::running));
+  double before = 0.0;
+  while (written[1] < 1.0) {
+    EXPECT_LE(written[1] - before, settings.rise_bar_per_s * 5e-3 + 1e-12);
+    before = written[1];
+    cycle();
+  }
+  wanted = {2.0, 0.0};  // once there, the controller's own limits hold
+  cycle();
+  EXPECT_DOUBLE_EQ(written[0], 2.0);
+  EXPECT_DOUBLE_EQ(written[1], 0.0);
+}
+
+TEST_F(Guard, ExpiryVentsInTheSameCycle) {
+  run();
+  commanding = false;
+  int cycles = 0;
+  while (written.maxCoeff() > 0.0) {
+    ASSERT_LT(++cycles, 100);
+    cycle();
+  }
+  EXPECT_EQ(cycles, 20) << "validity of 100 ms";
+  EXPECT_EQ(guard->state(), ValveState::vented);
+  EXPECT_EQ(guard->reason(), ValveReason::no_command);
+  EXPECT_EQ(guard->sequence(), CommandExpiry::kNoSequence);
+}
+
+TEST_F(Guard, ShadowMalformedAndNegativeCommandsNeverPressurise) {
+  ASSERT_TRUE(reach(ValveState::vented));
+  for (int k = 0; k < 50; ++k) {
+    pressures = {1.0, 1.0};
+    PressureCommand shadow{.sequence = sequence++,
+                           .validity_ns = 100 * kMs,
+                           .shadow = true,
+                           .pressure_bar = pressures};
+    guard->command(shadow, now);
+    cycle();
+    command(std::nan(""), 1.0);
+    cycle();
+    ASSERT_TRUE(written.isZero());
+    command(-1.0, -2.0);
+    cycle();
+    ASSERT_TRUE(written.isZero());
+  }
+}
+
+TEST_F(Guard, PressuresAboveTheLimitAreCut) {
+  wanted = {50.0, 1.0};
+  commanding = true;
+  ASSERT_TRUE(reach(ValveState::running));
+  for (int k = 0; k < 200; ++k) cycle();
+  EXPECT_DOUBLE_EQ(written[0], 2.0);
+}
+
+TEST_F(Guard, AFewLateAnswersAreTolerated) {
+  run();
+  for (int round = 0; round < 20; ++round) {
+    cycle(LinkResult::no_answer);
+    cycle(LinkResult::exception_reply);
+    EXPECT_EQ(guard->state(), ValveState::running);
+    cycle();
+    EXPECT_DOUBLE_EQ(written[0], 0.5);
+  }
+  cycle(LinkResult::no_answer);
+  cycle(LinkResult::no_answer);
+  cycle(LinkResult::no_answer);
+  EXPECT_EQ(guard->state(), ValveState::disconnected);
+  EXPECT_EQ(guard->reason(), ValveReason::no_answer);
+  EXPECT_TRUE(guard->set_points_bar().isZero());
+  EXPECT_TRUE(reach(ValveState::running));
+}
+
+TEST_F(Guard, ExceptionRepliesAreAnsweredWithZeroThenWithANewConnection) {
+  run();
+  for (int k = 0; k < 3; ++k) cycle(LinkResult::exception_reply);
+  EXPECT_EQ(guard->state(), ValveState::doubt);
+  EXPECT_EQ(cycle(LinkResult::exception_reply), ValveAction::exchange);
+  EXPECT_TRUE(written.isZero()) << "zero is offered as long as it answers";
+  for (int k = 0; k < 250 && guard->state() == ValveState::doubt; ++k)
+    cycle(LinkResult::exception_reply);
+  EXPECT_EQ(guard->state(), ValveState::disconnected);
+  EXPECT_TRUE(reach(ValveState::running));
+}
+
+TEST_F(Guard, ABrokenConnectionIsTriedAgainWithGrowingPauses) {
+  run();
+  cycle(LinkResult::broken);
+  EXPECT_EQ(guard->state(), ValveState::disconnected);
+  reachable = false;
+  std::int64_t last = now;
+  std::vector<std::int64_t> pauses;
+  while (pauses.size() < 9) {
+    if (cycle() == ValveAction::connect) {
+      pauses.push_back(now - last);
+      last = now;
+    }
+  }
+  EXPECT_NEAR(static_cast<double>(pauses[0]), 100.0 * kMs, kPeriod);
+  EXPECT_NEAR(static_cast<double>(pauses[1]), 200.0 * kMs, kPeriod);
+  EXPECT_NEAR(static_cast<double>(pauses[2]), 400.0 * kMs, kPeriod);
+  EXPECT_NEAR(static_cast<double>(pauses[8]), 5000.0 * kMs, kPeriod) << "no longer than that";
+  reachable = true;
+  EXPECT_TRUE(reach(ValveState::running));
+  EXPECT_EQ(guard->counters().connections, 2);
+}
+
+TEST_F(Guard, AStuckValveIsFoundAndStaysVentedUntilSomeoneLooked) {
+  run();
+  stuck_at = 0.0;
+  int cycles = 0;
+  while (guard->state() == ValveState::running) {
+    ASSERT_LT(++cycles, 400);
+    cycle();
+  }
+  EXPECT_NEAR(cycles, 202, 2) << "1 s";
+  EXPECT_EQ(guard->reason(), ValveReason::stuck_valve);
+  EXPECT_EQ(guard->chamber(), 0);
+  stuck_at = -1.0;
+  ASSERT_TRUE(reach(ValveState::vented));
+  for (int k = 0; k < 1000; ++k) cycle();
+  EXPECT_EQ(guard->reason(), ValveReason::waiting_for_zero);
+  wanted = {0.0, 0.0};
+  cycle();
+  wanted = {0.5, 1.0};
+  EXPECT_TRUE(reach(ValveState::running));
+}
+
+TEST_F(Guard, AValveThatDoesNotCloseStaysInDoubt) {
+  run();
+  stuck_at = 1.7;
+  ASSERT_TRUE(reach(ValveState::doubt));
+  for (int k = 0; k < 2000; ++k) cycle();
+  EXPECT_EQ(guard->state(), ValveState::doubt);
+}
+
+TEST_F(Guard, AStuckValveMayBeReportedOnly) {
+  settings.driver.stuck_vents = false;
+  make();
+  run();
+  stuck_at = 0.0;
+  for (int k = 0; k < 300; ++k) cycle();
+  EXPECT_EQ(guard->state(), ValveState::running);
+  EXPECT_EQ(guard->chamber(), 0);
+}
+
+TEST_F(Guard, ADiagnosisVentsAtOnceUntilItHasBeenAwayForAWhile) {
+  run();
+  read_back.diagnosis[1] = 4;
+  cycle();
+  EXPECT_EQ(guard->state(), ValveState::doubt);
+  EXPECT_EQ(guard->reason(), ValveReason::diagnosis);
+  EXPECT_EQ(guard->chamber(), 1);
+  cycle();
+  EXPECT_TRUE(written.isZero());
+  read_back.diagnosis[1] = 0;
+  int cycles = 0;
+  while (guard->state() == ValveState::doubt) {
+    ++cycles;
+    cycle();
+  }
+  EXPECT_EQ(cycles, 50);
+  EXPECT_TRUE(reach(ValveState::running));
+}
+
+TEST_F(Guard, ATerminalThatIsNotReadyIsWaitedForAndGivenUp) {
+  read_back.ready = false;
+  commanding = true;
+  ASSERT_TRUE(reach(ValveState::starting));
+  for (int k = 0; k < 3000; ++k) {
+    cycle();
+    ASSERT_EQ(guard->state(), ValveState::starting);
+  }
+  EXPECT_TRUE(reach(ValveState::disconnected));
+  EXPECT_EQ(guard->reason(), ValveReason::not_ready);
+}
+
+TEST_F(Guard, AGapInTimeIsADoubt) {
+  run();
+  now += 300 * kMs;
+  EXPECT_FALSE(guard->wake(now)) << "what waits in queues is too old";
+  EXPECT_EQ(guard->state(), ValveState::doubt);
+  EXPECT_EQ(guard->reason(), ValveReason::time_gap);
+  cycle();
+  EXPECT_TRUE(written.isZero());
+  EXPECT_TRUE(reach(ValveState::running));
+}
+
+TEST_F(Guard, WithExplicitArmingCommandsMustHaveBeenZeroAfterADoubt) {
+  settings.wait_for_zero = true;
+  make();
+  commanding = true;
+  ASSERT_TRUE(reach(ValveState::vented));
+  for (int k = 0; k < 200; ++k) cycle();
+  EXPECT_EQ(guard->reason(), ValveReason::waiting_for_zero);
+  wanted = {0.0, 0.0};
+  cycle();
+  wanted = {0.5, 1.0};
+  run();
+  cycle(LinkResult::broken);
+  ASSERT_TRUE(reach(ValveState::vented));
+  for (int k = 0; k < 200; ++k) cycle();
+  EXPECT_EQ(guard->reason(), ValveReason::waiting_for_zero);
+  commanding = false;  // silence is as good as zero
+  for (int k = 0; k < 30; ++k) cycle();
+  commanding = true;
+  EXPECT_TRUE(reach(ValveState::running));
+}
+
+TEST_F(Guard, AStopIsZeroAndConfirmed) {
+  run();
+  EXPECT_FALSE(guard->zero_confirmed());
+  guard->stop();
+  EXPECT_TRUE(guard->set_points_bar().isZero());
+  EXPECT_FALSE(guard->zero_confirmed()) << "not yet written";
+  cycle(LinkResult::no_answer);
+  EXPECT_FALSE(guard->zero_confirmed());
+  cycle();
+  EXPECT_TRUE(written.isZero());
+  EXPECT_TRUE(guard->zero_confirmed());
+  EXPECT_EQ(guard->reason(), ValveReason::shutdown);
+}
+
+TEST_F(Guard, AStopThatIsNotReadBackIsNotConfirmed) {
+  run();
+  guard->stop();
+  now += kPeriod;
+  guard->wake(now);
+  ASSERT_EQ(guard->next(now), ValveAction::exchange);
+  read_back.echo_bar.setConstant(0.5);  // as the terminal has it
+  guard->exchanged(LinkResult::ok, read_back, now);
+  EXPECT_FALSE(guard->zero_confirmed());
+}
+
+TEST_F(Guard, WithoutAConnectionThereIsNothingToConfirmUnlessPressureWasWritten) {
+  EXPECT_TRUE(guard->zero_confirmed());
+  run();
+  cycle(LinkResult::broken);
+  guard->stop();
+  EXPECT_FALSE(guard->zero_confirmed());
+  EXPECT_EQ(cycle(), ValveAction::wait) << "no new connection on the way out";
+}
+
+/// Any sequence of failures, commands and read-back: pressures in range, zero unless running.
+TEST_F(Guard, NeverPressurisesOutsideRunning) {
+  std::uint32_t state = 1;
+  const auto random = [&](std::uint32_t n) {
+    state = state * 1664525U + 1013904223U;
+    return (state >> 16) % n;
+  };
+  int ran = 0;
+  for (int k = 0; k < 200000; ++k) {
+    commanding = random(10) < 8;
+    wanted = {0.25 * random(16) - 1.0, 0.25 * random(16) - 1.0};
+    reachable = random(4) > 0;
+    as_written = random(4) > 0;
+    stuck_at = random(40) == 0 ? 1.5 : -1.0;
+    read_back.diagnosis[1] = random(300) == 0 ? 1 : 0;
+    if (random(500) == 0) now += 100 * kMs;
+    const auto dice = random(200);
+    cycle(dice == 0  ? LinkResult::broken
+          : dice < 4 ? LinkResult::no_answer
+          : dice < 8 ? LinkResult::exception_reply
+                     : LinkResult::ok);  // expectations stand in `cycle`
+    if (HasFailure()) return;
+    ran += guard->state() == ValveState::running;
+  }
+  EXPECT_GT(ran, 10000) << "or nothing was tested";
+}
+
+TEST_F(Guard, AllocatesNothing) {
+  run();
+  const long before = test::allocations;
+  for (int k = 0; k < 100; ++k) {
+    now += kPeriod;
+    guard->wake(now);
+    guard->next(now);
+    guard->exchanged(k % 7 == 0 ? LinkResult::no_answer : LinkResult::ok, read_back, now);
+  }
+  EXPECT_EQ(test::allocations - before, 0);
+}
+
+}  // namespace
+}  // namespace softarm
