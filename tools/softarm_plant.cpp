@@ -1,7 +1,10 @@
 // softarm-plant: the simulated arm in real time. Valve pressures in, motion-capture frames and
-// measured pressures out, in the messages the hardware speaks.
+// measured pressures out, in the messages the hardware speaks; with --modbus behind a valve
+// terminal's registers.
 #include <fmt/format.h>
 
+#include <memory>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -9,23 +12,41 @@
 #include "signals.hpp"
 #include "softarm/config/load.hpp"
 #include "softarm/daemon/realtime.hpp"
+#include "softarm/modbus/modbus_server.hpp"
 #include "softarm/plant/simulated_arm.hpp"
 #include "softarm/transport/lcm_node.hpp"
 #include "softarm/transport/message_decoding.hpp"
 #include "softarm/transport/mocap_adapter.hpp"
+#include "softarm/valves/simulated_terminal.hpp"
 
 namespace softarm {
 namespace {
 
+/// A valve terminal in front of the arm, polled by the plant's own loop.
+struct ModbusSide {
+  ModbusSide(const ValveDriverSettings& valves, int port)
+      : server(port), terminal(valves.registers, valves.order) {}
+
+  ModbusServer server;
+  SimulatedTerminal terminal;
+  std::int64_t sequence = 0;
+};
+
 class PlantProcess {
  public:
-  explicit PlantProcess(const Experiment& experiment)
+  PlantProcess(const Experiment& experiment, std::optional<int> modbus_port)
       : lcm_(experiment.daemon.lcm),
         adapter_(experiment.daemon.bodies, experiment.plant.arm),
         node_(lcm_.url),
         arm_(experiment.plant, monotonic_now_ns()),
         by_torque_(experiment.plant.actuation.kind == ActuationKind::torque),
         report_period_ns_(static_cast<std::int64_t>(1e9 / experiment.plant.mocap.rate_hz)) {
+    if (modbus_port) {
+      modbus_ = std::make_unique<ModbusSide>(experiment.valves, *modbus_port);
+      say(fmt::format("softarm-plant: valve terminal at 127.0.0.1 port {}\n",
+                      modbus_->server.port()));
+      return;
+    }
     // No exception may pass through LCM, so the handler only takes the message; the loop acts on
     // it.
     node_.subscribe(lcm_.command_channel, kCommandCapacity, [this](const ReceivedMessage& packet) {
@@ -37,13 +58,8 @@ class PlantProcess {
   void run() {
     std::int64_t next_report_ns = arm_.time_ns();
     while (stop_requested == 0) {
-      if (node_.wait_until(std::min(next_report_ns, arm_.next_event_ns()) + lost_ns_)) {
-        // All that came meanwhile: a full queue would keep the oldest commands and drop the newest.
-        int taken = 0;
-        do {
-          if (std::exchange(command_received_, false)) take_command();
-        } while (++taken < kCommandCapacity && node_.drain(1) > 0);
-      }
+      const std::int64_t deadline_ns = std::min(next_report_ns, arm_.next_event_ns()) + lost_ns_;
+      modbus_ ? serve_requests(deadline_ns) : take_commands(deadline_ns);
       advance();
       for (MocapFrame frame; arm_.receive(frame);) {
         adapter_.to_message(frame, (frame.capture_ns + lost_ns_) / 1000, frame_message_);
@@ -62,6 +78,32 @@ class PlantProcess {
   /// that is too slow would fall behind further with every step.
   static constexpr std::int64_t kMostBehind_ns = 250'000'000;
 
+  void take_commands(std::int64_t deadline_ns) {
+    if (!node_.wait_until(deadline_ns)) return;
+    // All that came meanwhile: a full queue would keep the oldest commands and drop the newest.
+    int taken = 0;
+    do {
+      if (std::exchange(command_received_, false)) take_command();
+    } while (++taken < kCommandCapacity && node_.drain(1) > 0);
+  }
+
+  /// What is written holds until the terminal's own time-out, counted from the last request.
+  void serve_requests(std::int64_t deadline_ns) {
+    if (!modbus_->server.wait_until(deadline_ns)) return;
+    advance();
+    SimulatedTerminal& terminal = modbus_->terminal;
+    terminal.measure(arm_.measured_pressures_bar());
+    modbus_->server.serve(terminal);
+    if (!terminal.take_served()) return;
+    const Eigen::VectorXd& bar = terminal.set_points_bar();
+    const double timeout_s = terminal.timeout_s();
+    arm_.command({.sequence = modbus_->sequence++,
+                  .validity_ns = timeout_s > 0.0 ? static_cast<std::int64_t>(1e9 * timeout_s)
+                                                 : CommandExpiry::kNever,
+                  .pressure_bar = {bar.data(), static_cast<std::size_t>(bar.size())}},
+                 arm_now_ns());
+  }
+
   /// The arm's own time: the monotonic clock without what was lost.
   std::int64_t arm_now_ns() {
     const std::int64_t now_ns = monotonic_now_ns() - lost_ns_;
@@ -76,7 +118,9 @@ class PlantProcess {
   void advance() {
     const bool was_vented = arm_.vented();
     arm_.advance_to(arm_now_ns());
-    if (arm_.vented() && !was_vented) say("softarm-plant: commands have stopped; vented\n");
+    if (!arm_.vented() || was_vented) return;
+    say("softarm-plant: commands have stopped; vented\n");
+    if (modbus_) modbus_->terminal.reset_outputs();
   }
 
   void take_command() {
@@ -105,7 +149,7 @@ class PlantProcess {
     measurement_message_.sequence = arm_.sequence();
     measurement_message_.num_chambers = static_cast<std::int16_t>(pressure.size());
     measurement_message_.pressure_bar.assign(pressure.begin(), pressure.end());
-    if (!by_torque_) node_.publish(lcm_.measurement_channel, measurement_message_);
+    if (!by_torque_ && !modbus_) node_.publish(lcm_.measurement_channel, measurement_message_);
 
     const SegmentVector u = plant.u_rad();
     const SegmentVector velocity = plant.velocity_radps();
@@ -129,6 +173,7 @@ class PlantProcess {
   MocapAdapter adapter_;
   LcmNode node_;
   SimulatedArm arm_;
+  std::unique_ptr<ModbusSide> modbus_;
   bool by_torque_;
   std::int64_t report_period_ns_;
   std::int64_t lost_ns_ = 0;
@@ -141,17 +186,25 @@ class PlantProcess {
   softarm_messages::plant_state_t state_message_;
 };
 
-int serve(const std::string& path) {
+int serve(const std::string& path, std::optional<int> modbus_port) {
   const Experiment experiment = load_experiment(path);
   const LcmSettings& lcm = experiment.daemon.lcm;
+  const bool by_torque = experiment.actuation.kind == ActuationKind::torque;
+  if (by_torque && modbus_port)
+    throw ConfigError(path, 0, "actuation.kind",
+                      "chambers with --modbus: a terminal has valves, not moments", "torque");
   const InstanceLock lock(lcm.mocap_channel + " on " + lcm.url);
+  // With softarm-valves there, measured pressures are its to publish.
+  std::optional<InstanceLock> measurement_lock;
+  if (!by_torque && !modbus_port)
+    measurement_lock.emplace(lcm.measurement_channel + " on " + lcm.url);
   catch_stop_signals();
   ignore_broken_pipes();
   say(fmt::format(
       "softarm-plant {} commit {} configuration {} seed {}: {}, motion capture at {} Hz\n",
       version_text(), commit_text(), hash_text(experiment.hash), experiment.seed, experiment.name,
       experiment.plant.mocap.rate_hz));
-  PlantProcess(experiment).run();
+  PlantProcess(experiment, modbus_port).run();
   return kExitOk;
 }
 
@@ -162,6 +215,12 @@ int main(int argc, char** argv) {
   CLI::App app("The simulated arm in real time: valve pressures in, motion-capture frames out",
                "softarm-plant");
   std::string config;
+  std::optional<int> modbus_port;
   app.add_option("CONFIG", config, "experiment in YAML")->required();
-  return softarm::run_program(argc, argv, app, [&] { return softarm::serve(config); });
+  app.add_option("--modbus", modbus_port,
+                 "serve as a valve terminal at this port of 127.0.0.1 (0: any) instead of taking "
+                 "commands from LCM")
+      ->check(CLI::Range(0, 65535))
+      ->type_name("PORT");
+  return softarm::run_program(argc, argv, app, [&] { return softarm::serve(config, modbus_port); });
 }

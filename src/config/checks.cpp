@@ -1,5 +1,6 @@
 #include "config/checks.hpp"
 
+#include <arpa/inet.h>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -13,6 +14,7 @@
 #include "softarm/actuation/pressure_allocator.hpp"
 #include "softarm/control/curvature_controller.hpp"
 #include "softarm/control/reference.hpp"
+#include "softarm/valves/register_map.hpp"
 
 namespace softarm {
 namespace {
@@ -39,6 +41,7 @@ class Checks {
     check_bodies();
     check_safety();
     check_lcm();
+    check_valves();
     check_rooms();
   }
 
@@ -207,6 +210,7 @@ class Checks {
         {"status_channel", lcm.status_channel},
         {"timing_channel", lcm.timing_channel},
         {"tick_channel", lcm.tick_channel},
+        {"valves_channel", lcm.valves_channel},
         {"plant_channel", lcm.plant_channel}};
     std::set<std::string> seen;
     for (const auto& [key, name] : channels) {
@@ -221,6 +225,41 @@ class Checks {
     }
     require(lcm.url.find("://") != std::string::npos, "daemon.lcm.url",
             "an LCM provider, such as udpm://239.255.76.67:7667?ttl=0", "\"" + lcm.url + "\"");
+  }
+
+  void check_valves() const {
+    const ValveDriverSettings& valves = experiment_.valves;
+    // Arms that have no terminal need not fit into one.
+    if (experiment_.actuation.kind == ActuationKind::torque || !reader_.given("valves")) return;
+    in_addr address{};
+    require(inet_pton(AF_INET, valves.host.c_str(), &address) == 1, "valves.host",
+            "an IPv4 address", "\"" + valves.host + "\"");
+    std::set<int> seen;
+    for (const int valve : valves.order) {
+      require(seen.insert(valve).second, "valves.order", "every valve once",
+              fmt::format("valve {} twice", valve));
+    }
+    const double period_s = 1.0 / valves.rate_hz;
+    require(valves.response_timeout_s < period_s, "valves.response_timeout_s",
+            fmt::format("less than one period of valves.rate_hz ({:.6g} s)", period_s),
+            fmt::format("{} s", valves.response_timeout_s));
+    require(valves.backoff_s <= valves.longest_backoff_s, "valves.longest_backoff_s",
+            fmt::format("at least backoff_s ({} s)", valves.backoff_s),
+            fmt::format("{} s", valves.longest_backoff_s));
+    const double silent_s = (valves.tolerated_failures + 1) * period_s;
+    const double least_s = std::max(valves.registers.timeout_least_s, silent_s);
+    require(valves.failsafe_timeout_s >= least_s, "valves.failsafe_timeout_s",
+            fmt::format("at least {:.6g} s (what the terminal takes, and tolerated_failures + 1 "
+                        "periods)",
+                        least_s),
+            fmt::format("{} s", valves.failsafe_timeout_s));
+    const double units = valves.failsafe_timeout_s / valves.registers.timeout_unit_s;
+    require(units >= 0.5 && units < (valves.registers.timeout_words == 2 ? 4294967295.0 : 65535.0),
+            "valves.failsafe_timeout_s", "a time-out that fits its register",
+            fmt::format("{:.6g} units", units));
+    const std::string fault =
+        register_map_fault(valves.registers, valves.order, experiment_.actuation.max_pressure_bar);
+    require(fault.empty(), "valves.registers", "registers that fit together", fault);
   }
 
   /// What the rooms themselves refuse: a map of chambers that cannot reach every direction, and the

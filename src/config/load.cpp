@@ -8,6 +8,7 @@
 #include "config/reader.hpp"
 #include "config/writer.hpp"
 #include "config/yaml_tree.hpp"
+#include "softarm/valves/register_map.hpp"
 
 namespace softarm {
 namespace {
@@ -43,6 +44,7 @@ Experiment example_experiment() {
   example.plant.actuation = example.actuation;
   example.plant.initial_u_rad.setZero(4);
   example.plant.loads.resize(1);
+  example.valves.registers = register_preset(example.valves.terminal);
   const std::vector<WayPoint> points = {
       {0.0, {0.0, 0.0, 0.0, 0.0}}, {2.0, {0.3, 0.0, 0.5, 0.0}}, {4.0, {0.0, 0.0, 0.0, 0.0}}};
   TipPathReference tip;

@@ -5,6 +5,7 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "config/schema.hpp"
@@ -24,6 +25,9 @@ class ExperimentReader : public SchemaVisitor {
   /// An error at `path` ("a.b[1].c"), or at the nearest section around it that stands in the file.
   ConfigError error_at(const std::string& path, const std::string& expected,
                        const std::string& got) const;
+
+  /// Whether the file says anything at this path.
+  bool given(std::string_view path) const { return locations_.find(path) != locations_.end(); }
 
   bool reading() const override { return true; }
   bool prefers(const char* first, const char* second) override;

@@ -281,6 +281,12 @@ void describe_experiment(SchemaVisitor& visitor, Experiment& experiment) {
   describe_reference(visitor, experiment.reference, n);
   visitor.section({"daemon", "", "rate, safety and connections of softarmd"}, SectionKind::plain,
                   [&] { describe_daemon(visitor, experiment.daemon, n); });
+  int chambers = 0;
+  for (const auto& segment : experiment.actuation.segments)
+    chambers += static_cast<int>(segment.size());
+  visitor.section({"valves", "", "the valve terminal that softarm-valves drives"},
+                  SectionKind::plain,
+                  [&] { describe_valves(visitor, experiment.valves, chambers); });
   visitor.section({"plant", "", "the simulated arm; left out: equal to the controller's"},
                   SectionKind::plain, [&] { describe_plant(visitor, experiment); });
   visitor.section({"run", "", "defaults of a simulated run"}, SectionKind::plain,

@@ -53,6 +53,7 @@ struct Shape {
 enum class SectionKind {
   plain,
   defaults_elsewhere,  ///< its defaults are values of other sections: the template only hints at it
+  defaults_by_choice,  ///< its defaults depend on the key before: the template only hints at it
   input_only           ///< turned into values of other keys: not part of the resolved configuration
 };
 
@@ -123,6 +124,8 @@ void describe_control(SchemaVisitor& visitor, ControllerSettings& control, int s
 void describe_reference(SchemaVisitor& visitor, ReferenceSettings& reference, int segments);
 void describe_daemon(SchemaVisitor& visitor, DaemonSettings& daemon, int segments);
 void describe_plant(SchemaVisitor& visitor, Experiment& experiment);
+/// `chambers` of the whole arm.
+void describe_valves(SchemaVisitor& visitor, ValveDriverSettings& valves, int chambers);
 /// A curvature of every segment, as `theta_rad` and `phi_rad` or as `u_rad`; `what` tells whose.
 void describe_pose(SchemaVisitor& visitor, std::vector<double>& u_rad, int segments,
                    Presence presence);

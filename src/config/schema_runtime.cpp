@@ -159,6 +159,7 @@ void describe_lcm(SchemaVisitor& visitor, LcmSettings& lcm) {
       {"tick_channel", "", "what every tick was given, for softarm replay; empty: not published",
        from_to(0, 63)},
       lcm.tick_channel);
+  channel("valves_channel", "status of the valves' driver", lcm.valves_channel);
   channel("plant_channel", "a simulated arm's true state", lcm.plant_channel);
   visitor.number({"command_validity_s", "s", "after which the valve side vents by itself",
                   above_to(0.0, 10.0)},

@@ -130,4 +130,9 @@ bool decode(std::span<const std::byte> bytes, softarm_messages::tick_record_t& m
   return decode_exactly(bytes, at + 4 + static_cast<std::size_t>(build) + 8, message);
 }
 
+bool decode(std::span<const std::byte> bytes, softarm_messages::valves_status_t& message) noexcept {
+  // Two lists of one length.
+  return decode_list(bytes, 3 * 8 + 2 * 1 + 2 + 7 * 4, 2 * 4, kMaxChambers, message);
+}
+
 }  // namespace softarm

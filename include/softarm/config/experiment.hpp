@@ -6,6 +6,7 @@
 
 #include "softarm/daemon/pipeline_settings.hpp"
 #include "softarm/plant/settings.hpp"
+#include "softarm/valves/settings.hpp"
 
 namespace softarm {
 
@@ -19,6 +20,7 @@ struct Experiment : PipelineSettings {
   std::string name;
   std::uint64_t seed = 1;
   PlantSettings plant;
+  ValveDriverSettings valves;
   RunSettings run;
   std::uint64_t hash = 0;  ///< FNV-1a of the resolved configuration's text
 };

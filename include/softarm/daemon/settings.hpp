@@ -50,7 +50,8 @@ struct LcmSettings {
   std::string operator_channel = "SOFTARM_OPERATOR";
   std::string status_channel = "SOFTARM_STATUS";
   std::string timing_channel = "SOFTARM_TIMING";
-  std::string tick_channel = "SOFTARM_TICK";    ///< records for replay; empty: none
+  std::string tick_channel = "SOFTARM_TICK";  ///< records for replay; empty: none
+  std::string valves_channel = "SOFTARM_VALVES";
   std::string plant_channel = "SOFTARM_PLANT";  ///< a simulated arm's true state, for reports
   double command_validity_s = 0.1;              ///< after which the valve side vents by itself
 };

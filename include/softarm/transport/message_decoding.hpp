@@ -13,6 +13,7 @@
 #include <softarm_messages/tick_record_t.hpp>
 #include <softarm_messages/timing_t.hpp>
 #include <softarm_messages/torque_command_t.hpp>
+#include <softarm_messages/valves_status_t.hpp>
 #include <span>
 
 namespace softarm {
@@ -35,5 +36,6 @@ bool decode(std::span<const std::byte> bytes,
 bool decode(std::span<const std::byte> bytes, softarm_messages::plant_state_t& message) noexcept;
 bool decode(std::span<const std::byte> bytes, softarm_messages::timing_t& message) noexcept;
 bool decode(std::span<const std::byte> bytes, softarm_messages::tick_record_t& message) noexcept;
+bool decode(std::span<const std::byte> bytes, softarm_messages::valves_status_t& message) noexcept;
 
 }  // namespace softarm

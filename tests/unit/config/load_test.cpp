@@ -52,7 +52,7 @@ TEST(Template, IsUpToDate) {
 /// Hints in the template are in force once their "# " is taken away.
 TEST(Template, HintsLoadWhenUncommented) {
   const std::string text = std::regex_replace(
-      template_text(), std::regex("\n  # (mismatch:|arm:|actuation:|  )"), "\n  $1");
+      template_text(), std::regex("\n  # (mismatch:|arm:|actuation:|registers:|  )"), "\n  $1");
   ASSERT_NE(text, template_text());
   const std::string planar =
       "  plane_rad: 0\n";  // the one hint that would change the chambers needed

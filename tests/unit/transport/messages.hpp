@@ -125,6 +125,21 @@ inline softarm_messages::plant_state_t example(int segments, int chambers) {
 }
 
 template <>
+inline softarm_messages::valves_status_t example(int segments, int chambers) {
+  softarm_messages::valves_status_t message{};
+  message.time_us = 46;
+  message.sequence = -1;
+  message.state = 5;
+  message.reason = 8;
+  message.chamber = -1;
+  message.late_cycles = 9;
+  message.num_chambers = static_cast<std::int16_t>(segments * chambers);
+  message.set_point_bar = numbers<float>(segments * chambers, 0.0);
+  message.actual_bar = numbers<float>(segments * chambers, 3.0);
+  return message;
+}
+
+template <>
 inline softarm_messages::timing_t example(int /*segments*/, int /*chambers*/) {
   softarm_messages::timing_t message{};
   message.ticks = 1'000'000;

@@ -1,0 +1,469 @@
+// softarm-valves between LCM and Modbus TCP, whole programs on both sides: the simulated arm's
+// server through a relay that does harm, and pymodbus, which is not ours.
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <functional>
+#include <regex>
+
+#include "integration/processes/process.hpp"
+#include "integration/valves/relay.hpp"
+#include "softarm/daemon/realtime.hpp"
+#include "softarm/transport/lcm_node.hpp"
+#include "softarm/transport/message_decoding.hpp"
+#include "softarm/valves/valve_guard.hpp"
+
+namespace softarm {
+namespace {
+
+using namespace std::chrono_literals;
+using test::Process;
+using test::Relay;
+
+constexpr std::int64_t kSecond = 1'000'000'000;
+constexpr int kChambers = 12;
+
+class ValvesProgram : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = std::filesystem::temp_directory_path() /
+              ("softarm_" + std::to_string(getpid()) + "_" +
+               ::testing::UnitTest::GetInstance()->current_test_info()->name());
+    std::filesystem::create_directories(folder_);
+    url_ = "udpm://239.255.76.67:" + std::to_string(20000 + getpid() % 40000) + "?ttl=0";
+    try {
+      node_ = std::make_unique<LcmNode>(url_);
+      node_->subscribe("SOFTARM_VALVES", 4096, [this](const ReceivedMessage& packet) {
+        if (decode(packet.bytes, status_)) ++statuses_;
+      });
+      node_->subscribe("SOFTARM_PRESSURE", 4096, [this](const ReceivedMessage& packet) {
+        if (decode(packet.bytes, measured_)) ++measurements_;
+      });
+      node_->subscribe("SOFTARM_PLANT", 4096,
+                       [this](const ReceivedMessage& packet) { decode(packet.bytes, plant_); });
+    } catch (const TransportError& error) {
+      GTEST_SKIP() << error.what();
+    }
+    command_.num_chambers = kChambers;
+    command_.pressure_bar.assign(kChambers, 0.0F);
+    command_.validity_us = 300'000;
+  }
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+
+  /// `valves` and `more` are YAML of their own.
+  void write_config(int port, const std::string& valves = "", const std::string& safety = "") {
+    config_ = folder_ / "config.yaml";
+    // A machine that is busy with other things must not look like a faulty terminal.
+    std::ofstream(config_) << "include: "
+                           << std::filesystem::path(SOFTARM_SOURCE_DIR) /
+                                  "config/paper_arm_modbus.yaml"
+                           << "\nname: under_test\ndaemon:\n  lcm: {url: \"" << url_
+                           << "\"}\n  safety: {valve_readback: false" << safety
+                           << "}\nvalves: {port: " << port << ", failsafe_timeout_s: 0.3"
+                           << (valves.find("rate_hz") == std::string::npos
+                                   ? ", rate_hz: 20, response_timeout_s: 0.049"
+                                   : "")
+                           << valves << "}\n";
+  }
+
+  std::unique_ptr<Process> start(const std::string& program,
+                                 std::vector<std::string> arguments = {}) {
+    arguments.push_back(config_.string());
+    return std::make_unique<Process>(program, arguments,
+                                     (folder_ / ("output" + std::to_string(started_++))).string());
+  }
+
+  /// The simulated arm behind its server, at a port of the kernel's choice.
+  std::unique_ptr<Process> start_plant(int& port) {
+    auto plant = start("softarm-plant", {"--modbus", "0"});
+    std::smatch match;
+    std::string printed;
+    wait_for([&] {
+      printed = plant->printed();
+      return std::regex_search(printed, match, std::regex("127.0.0.1 port ([0-9]+)"));
+    });
+    port = match.empty() ? 0 : std::stoi(match[1]);
+    EXPECT_GT(port, 0) << printed;
+    return plant;
+  }
+
+  /// Handles messages, and commands `bar` in every chamber (unless negative), until `reached`.
+  bool wait_for(const std::function<bool()>& reached, double bar = -1.0, double patience_s = 20.0) {
+    const std::int64_t end_ns = monotonic_now_ns() + static_cast<std::int64_t>(patience_s * 1e9);
+    while (monotonic_now_ns() < end_ns) {
+      if (reached()) return true;
+      if (bar >= 0.0) send(bar);
+      node_->wait_until(monotonic_now_ns() + kSecond / 100);
+      node_->drain(1000);
+    }
+    return reached();
+  }
+  void send(double bar) {
+    ++command_.sequence;
+    command_.pressure_bar.assign(kChambers, static_cast<float>(bar));
+    node_->publish("SOFTARM_PRESSURE_COMMAND", command_);
+  }
+
+  ValveState state() const {
+    return statuses_ > 0 ? static_cast<ValveState>(status_.state) : ValveState::disconnected;
+  }
+  ValveReason reason() const { return static_cast<ValveReason>(status_.reason); }
+  bool is(ValveState wanted, ValveReason why) const {
+    return statuses_ > 0 && state() == wanted && reason() == why;
+  }
+  /// Measured pressures all near `bar`, in the plant itself and as the driver tells them.
+  bool pressure_is(double bar) const {
+    const auto near = [bar](const std::vector<float>& list) {
+      return list.size() == kChambers && std::all_of(list.begin(), list.end(), [bar](float p) {
+               return std::abs(static_cast<double>(p) - bar) < 0.02;
+             });
+    };
+    return near(plant_.pressure_bar) && near(measured_.pressure_bar);
+  }
+
+  std::filesystem::path folder_, config_;
+  std::string url_;
+  std::unique_ptr<LcmNode> node_;
+  softarm_messages::valves_status_t status_{};
+  softarm_messages::pressure_measurement_t measured_{};
+  softarm_messages::plant_state_t plant_{};
+  softarm_messages::pressure_command_t command_{};
+  int statuses_ = 0, measurements_ = 0, started_ = 0;
+};
+
+/// The simulated arm, the relay, the driver.
+class ValvesBehindARelay : public ValvesProgram {
+ protected:
+  void begin(const std::string& valves = "", const std::string& safety = "") {
+    write_config(1, valves, safety);
+    int port = 0;
+    plant_process_ = start_plant(port);
+    relay_ = std::make_unique<Relay>(port);
+    write_config(relay_->port(), valves, safety);
+    driver_ = start("softarm-valves");
+  }
+  void TearDown() override {
+    if (relay_) {
+      EXPECT_EQ(relay_->negative_set_points, 0);
+    }
+    driver_.reset();
+    relay_.reset();
+    plant_process_.reset();
+    ValvesProgram::TearDown();
+  }
+  bool run_at(double bar) {
+    return wait_for([&] { return is(ValveState::running, ValveReason::none) && pressure_is(bar); },
+                    bar);
+  }
+  /// It came back by itself and the arm is under pressure again.
+  void expect_recovery() { EXPECT_TRUE(run_at(0.3)) << driver_->printed(); }
+
+  std::unique_ptr<Process> plant_process_, driver_;
+  std::unique_ptr<Relay> relay_;
+};
+
+TEST_F(ValvesBehindARelay, CommandsReachTheArmExpireAndAStopVents) {
+  begin();
+  ASSERT_TRUE(run_at(0.4)) << driver_->printed() << plant_process_->printed();
+  EXPECT_GE(measured_.sequence, 0);
+  EXPECT_EQ(plant_.vented, 0);
+  // Nothing is sent any more.
+  ASSERT_TRUE(wait_for([&] {
+    return is(ValveState::vented, ValveReason::no_command) && pressure_is(0.0);
+  })) << driver_->printed();
+  EXPECT_EQ(measured_.sequence, -1);
+  ASSERT_TRUE(run_at(0.4));
+  driver_->signal(SIGTERM);
+  EXPECT_EQ(driver_->wait(1000ms), 0) << driver_->printed();
+  EXPECT_TRUE(wait_for([&] { return plant_.vented != 0; }, 0.4)) << "its time-out, later";
+  EXPECT_LT(plant_.pressure_bar[0], 0.02F);
+  EXPECT_EQ(plant_process_->printed().find("behind"), std::string::npos);
+}
+
+TEST_F(ValvesBehindARelay, ShadowForeignAndHostileCommandsMoveNothing) {
+  begin();
+  ASSERT_TRUE(wait_for([&] { return state() == ValveState::vented; })) << driver_->printed();
+  const auto publish_for_a_while = [&] {
+    const int before = measurements_;
+    EXPECT_TRUE(wait_for([&] {
+      ++command_.sequence;
+      node_->publish("SOFTARM_PRESSURE_COMMAND", command_);
+      return measurements_ > before + 10;
+    }));
+  };
+  command_.pressure_bar.assign(kChambers, 1.0F);
+  command_.shadow = 1;
+  publish_for_a_while();
+  command_.shadow = 0;
+  command_.pressure_bar[3] = std::nanf("");
+  publish_for_a_while();
+  command_.pressure_bar.assign(kChambers + 1, 1.0F);
+  command_.num_chambers = kChambers + 1;
+  publish_for_a_while();
+  command_.pressure_bar.assign(kChambers, -1.0F);
+  command_.num_chambers = kChambers;
+  publish_for_a_while();
+  EXPECT_TRUE(pressure_is(0.0));
+  EXPECT_GT(status_.commands_refused, 0);
+  command_.validity_us = 300'000;
+  EXPECT_TRUE(run_at(0.2)) << "and it still takes good ones" << driver_->printed();
+}
+
+TEST_F(ValvesBehindARelay, LateAnswersVentAndAreSurvived) {
+  begin();
+  ASSERT_TRUE(run_at(0.3)) << driver_->printed();
+  relay_->delay_us = 80'000;
+  ASSERT_TRUE(wait_for([&] { return is(ValveState::disconnected, ValveReason::no_answer); }, 0.3))
+      << driver_->printed();
+  EXPECT_GT(status_.no_answers, 2);
+  EXPECT_TRUE(wait_for([&] { return plant_.pressure_bar[0] < 0.02F; }, 0.3))
+      << "by zero or time-out";
+  relay_->delay_us = 0;
+  expect_recovery();
+}
+
+TEST_F(ValvesBehindARelay, ExceptionRepliesVentAndAreSurvived) {
+  begin();
+  ASSERT_TRUE(run_at(0.3)) << driver_->printed();
+  relay_->exceptions = true;
+  ASSERT_TRUE(wait_for([&] { return is(ValveState::doubt, ValveReason::exception_reply); }, 0.3))
+      << driver_->printed();
+  ASSERT_TRUE(wait_for([&] { return plant_.pressure_bar[0] < 0.02F; }, 0.3));
+  EXPECT_GT(status_.exceptions, 2);
+  relay_->exceptions = false;
+  expect_recovery();
+}
+
+TEST_F(ValvesBehindARelay, ADisconnectInTheMiddleOfAWriteVentsAndIsSurvived) {
+  begin();
+  for (int round = 0; round < 3; ++round) {
+    ASSERT_TRUE(run_at(0.3)) << driver_->printed();
+    const int before = status_.broken;
+    relay_->refuse = round == 2;
+    relay_->cut_next_write = true;
+    ASSERT_TRUE(wait_for([&] { return status_.broken > before; }, 0.3)) << driver_->printed();
+    EXPECT_TRUE(wait_for([&] { return plant_.pressure_bar[0] < 0.02F; }, 0.3));
+    relay_->refuse = false;
+  }
+  expect_recovery();
+  EXPECT_GT(relay_->connections, 3);
+}
+
+TEST_F(ValvesBehindARelay, AStuckValveIsReportedAndVents) {
+  begin(", stuck_after_s: 0.3");
+  ASSERT_TRUE(run_at(0.3)) << driver_->printed();
+  relay_->stuck_at = 900;
+  relay_->stuck_word = 3 * 5;  // measured pressure of the sixth valve
+  ASSERT_TRUE(wait_for([&] { return is(ValveState::doubt, ValveReason::stuck_valve); }, 0.3))
+      << driver_->printed();
+  EXPECT_EQ(status_.chamber, 5);
+  EXPECT_TRUE(wait_for([&] { return plant_.pressure_bar[0] < 0.02F; }, 0.3));
+  EXPECT_TRUE(wait_for(
+      [&] { return driver_->printed().find("stuck valve): chamber 5") != std::string::npos; }));
+  relay_->stuck_word = -1;
+  ASSERT_TRUE(wait_for([&] { return is(ValveState::vented, ValveReason::waiting_for_zero); }, 0.3));
+  ASSERT_TRUE(wait_for([&] { return state() == ValveState::running; }, 0.0));
+  expect_recovery();
+}
+
+TEST_F(ValvesBehindARelay, ATerminalThatRestartsIsSecuredAgain) {
+  begin();
+  ASSERT_TRUE(run_at(0.3)) << driver_->printed();
+  plant_process_->signal(SIGKILL);
+  ASSERT_EQ(plant_process_->wait(5s), 128 + SIGKILL);
+  ASSERT_TRUE(wait_for([&] { return state() == ValveState::disconnected; }, 0.3))
+      << driver_->printed();
+  int port = 0;
+  plant_process_ = start_plant(port);
+  relay_->server_port_ = port;
+  expect_recovery();
+  // Had its time-out not been set once more, this arm would keep its pressure.
+  driver_->signal(SIGKILL);
+  EXPECT_TRUE(wait_for([&] { return plant_.vented != 0 && plant_.pressure_bar[0] < 0.02F; }, 0.3));
+}
+
+TEST_F(ValvesBehindARelay, AStoppedAndContinuedDriverVents) {
+  begin();
+  ASSERT_TRUE(run_at(0.3)) << driver_->printed();
+  driver_->signal(SIGSTOP);
+  ASSERT_TRUE(wait_for([&] { return plant_.vented != 0; }, 0.3)) << "the terminal's own time-out";
+  driver_->signal(SIGCONT);
+  EXPECT_TRUE(wait_for([&] { return is(ValveState::doubt, ValveReason::time_gap); }, 0.3))
+      << driver_->printed();
+  expect_recovery();
+}
+
+TEST_F(ValvesBehindARelay, WithExplicitArmingCommandsOfZeroComeFirst) {
+  begin("", ", arming: explicit");
+  ASSERT_TRUE(wait_for([&] { return is(ValveState::vented, ValveReason::no_command); }))
+      << driver_->printed();
+  ASSERT_TRUE(run_at(0.3)) << driver_->printed();
+  relay_->cut_next_write = true;
+  ASSERT_TRUE(wait_for([&] { return is(ValveState::vented, ValveReason::waiting_for_zero); }, 0.3))
+      << driver_->printed();
+  EXPECT_FALSE(wait_for([&] { return state() == ValveState::running; }, 0.3, 1.0));
+  ASSERT_TRUE(wait_for([&] { return state() == ValveState::running; }, 0.0));
+  expect_recovery();
+}
+
+TEST_F(ValvesBehindARelay, ASecondDriverIsKeptOut) {
+  begin();
+  ASSERT_TRUE(wait_for([&] { return state() == ValveState::vented; })) << driver_->printed();
+  const auto same = start("softarm-valves");
+  EXPECT_EQ(same->wait(5s), 75) << same->printed();
+  const auto plant_of_lcm = start("softarm-plant");  // it would publish the same pressures
+  EXPECT_EQ(plant_of_lcm->wait(5s), 75) << plant_of_lcm->printed();
+  // Another arm by its channels, but the same terminal.
+  std::ofstream(config_, std::ios::app) << "# other\n";
+  const std::string text = [&] {
+    std::ostringstream all;
+    all << std::ifstream(config_).rdbuf();
+    return all.str();
+  }();
+  std::ofstream(config_) << std::regex_replace(
+      text, std::regex("lcm: \\{"), "lcm: {command_channel: OTHER, measurement_channel: OTHER_P, ");
+  const auto other = start("softarm-valves");
+  EXPECT_EQ(other->wait(5s), 75) << other->printed();
+  EXPECT_NE(other->printed().find("terminal 127.0.0.1"), std::string::npos) << other->printed();
+}
+
+TEST_F(ValvesProgram, AStopWithoutATerminalIsNoError) {
+  int free_port = 0;
+  { free_port = Relay(1).port(); }
+  write_config(free_port);
+  const auto driver = start("softarm-valves");
+  ASSERT_TRUE(wait_for([&] { return statuses_ > 3; }, 0.3)) << driver->printed();
+  EXPECT_EQ(state(), ValveState::disconnected);
+  EXPECT_EQ(measurements_, 0) << "no pressure was measured";
+  driver->signal(SIGTERM);
+  EXPECT_EQ(driver->wait(1000ms), 0) << driver->printed();
+}
+
+/// A terminal by pymodbus; its standard input is a pipe.
+class ValvesAtPymodbus : public ValvesProgram {
+ protected:
+  static bool installed() {
+    return std::system(
+               "/usr/bin/python3 -c 'import pymodbus.server, pymodbus.client' >/dev/null 2>&1") ==
+           0;
+  }
+  void SetUp() override {
+    if (!installed()) GTEST_SKIP() << "no pymodbus for /usr/bin/python3: tools/install_packages";
+    ValvesProgram::SetUp();
+  }
+  std::unique_ptr<Process> python(const std::string& script, const std::string& arguments) {
+    return std::make_unique<Process>(
+        "//bin/sh",
+        std::vector<std::string>{"-c", "exec /usr/bin/python3 -B " SOFTARM_SOURCE_DIR
+                                       "/tests/integration/valves/" +
+                                           script + " " + arguments},
+        (folder_ / (script + ".output")).string());
+  }
+  void begin(const std::string& more = "") {
+    pipe_ = (folder_ / "orders").string();
+    ASSERT_EQ(mkfifo(pipe_.c_str(), 0600), 0);
+    terminal_ = python("pymodbus_terminal.py", "12 40003 45395 46100" + more + " <>" + pipe_);
+    std::smatch match;
+    std::string printed;
+    ASSERT_TRUE(wait_for([&] {
+      printed = terminal_->printed();
+      return std::regex_search(printed, match, std::regex("port ([0-9]+)"));
+    })) << printed;
+    write_config(std::stoi(match[1]));
+    driver_ = start("softarm-valves");
+  }
+  void order(const std::string& line) { std::ofstream(pipe_) << line << std::endl; }
+  struct State {
+    int now = -1, largest = -1, negative = -1, timeout_ms = -1;
+  };
+  State state_of_terminal() {
+    const auto states = [this] {
+      const std::string printed = terminal_->printed();
+      return std::count(printed.begin(), printed.end(), '\n');
+    };
+    const auto before = states();
+    order("state");
+    wait_for([&] { return states() > before; });
+    const std::string printed = terminal_->printed();
+    State state;
+    std::istringstream(printed.substr(printed.rfind("state") + 5)) >> state.now >> state.largest >>
+        state.negative >> state.timeout_ms;
+    return state;
+  }
+
+  std::string pipe_;
+  std::unique_ptr<Process> terminal_, driver_;
+};
+
+TEST_F(ValvesAtPymodbus, AForeignTerminalIsSecuredDrivenDoubtedAndVented) {
+  begin();
+  ASSERT_TRUE(wait_for(
+      [&] {
+        return state() == ValveState::running && measured_.pressure_bar.size() == kChambers &&
+               std::abs(measured_.pressure_bar[11] - 0.7F) < 1e-3F;
+      },
+      0.7))
+      << driver_->printed();
+  State there = state_of_terminal();
+  EXPECT_EQ(there.largest, 700);
+  EXPECT_EQ(there.negative, 0);
+  EXPECT_EQ(there.timeout_ms, 300);
+  order("diagnosis 4 8");
+  ASSERT_TRUE(wait_for([&] { return is(ValveState::doubt, ValveReason::diagnosis); }, 0.7))
+      << driver_->printed();
+  EXPECT_EQ(status_.chamber, 4);
+  ASSERT_TRUE(wait_for([&] { return state_of_terminal().now == 0; }));
+  order("diagnosis 4 0");
+  ASSERT_TRUE(wait_for([&] { return state() == ValveState::running; }, 0.7)) << driver_->printed();
+  driver_->signal(SIGTERM);
+  EXPECT_EQ(driver_->wait(1000ms), 0) << driver_->printed();
+  EXPECT_EQ(state_of_terminal().now, 0);
+}
+
+TEST_F(ValvesAtPymodbus, ATerminalThatDoesNotTakeItsTimeOutIsNeverPressurised) {
+  begin(" refuse");
+  ASSERT_TRUE(
+      wait_for([&] { return is(ValveState::disconnected, ValveReason::failsafe_refused); }, 0.7))
+      << driver_->printed();
+  EXPECT_TRUE(wait_for([&] { return status_.connections > 0; }, 0.7));
+  EXPECT_EQ(state_of_terminal().largest, 0);
+  EXPECT_TRUE(wait_for([&] {
+    return driver_->printed().find(
+               "fail-safe time-out refused: set 0.3 s at register 46100, read "
+               "back 0 s") != std::string::npos;
+  })) << driver_->printed();
+}
+
+TEST_F(ValvesAtPymodbus, AForeignClientFindsTheSimulatedTerminalAsItShouldBe) {
+  write_config(1);
+  int port = 0;
+  const auto plant = start_plant(port);
+  const auto client = python("pymodbus_client.py", std::to_string(port));
+  int code = -1;
+  wait_for([&] { return (code = client->wait(0ms)) >= 0; }, -1.0, 60.0);
+  EXPECT_EQ(code, 0) << client->printed();
+}
+
+TEST_F(ValvesProgram, TheDaemonClosesTheLoopThroughEveryInterface) {
+  write_config(1);
+  int port = 0;
+  const auto plant = start_plant(port);
+  write_config(port, ", rate_hz: 200, response_timeout_s: 0.0049");
+  const auto driver = start("softarm-valves");
+  const auto daemon = start("softarmd");
+  // Two seconds into (24) every segment is bent by 0.4 rad.
+  EXPECT_TRUE(wait_for([&] {
+    return plant_.num_segments == 3 &&
+           std::abs(std::hypot(plant_.u_rad[2][0], plant_.u_rad[2][1]) - 0.4) < 0.05;
+  })) << driver->printed()
+      << daemon->printed();
+  daemon->signal(SIGTERM);
+  EXPECT_EQ(daemon->wait(2000ms), 0) << daemon->printed();
+  EXPECT_TRUE(wait_for([&] { return pressure_is(0.0); })) << driver->printed();
+}
+
+}  // namespace
+}  // namespace softarm
