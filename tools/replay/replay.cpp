@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <utility>
 
 #include "softarm/config/load.hpp"
@@ -50,7 +51,7 @@ void Replay::keep(const LogEvent& event, Window<Kind>& window, Kind& incoming, T
 void Replay::take_record(const LogEvent& event) {
   WaitingRecord& incoming = incoming_record_;
   const tick_record_t& record = incoming.message;
-  if (!decode(event.data, incoming.message) || !is_intact(event.data) || record.tick < 1) {
+  if (!decode(event.data, incoming.message) || !is_intact(event.data) || !fits(record)) {
     ++summary_.malformed;
     return;
   }
@@ -70,6 +71,23 @@ void Replay::take_record(const LogEvent& event) {
   newest_ = std::max(newest_, record.tick);
   std::swap(place(*records_, record.tick), incoming);
   advance(kPatience);
+}
+
+/// Of an arm like ours, and with times that can be added and subtracted.
+bool Replay::fits(const tick_record_t& record) const {
+  constexpr std::int64_t kMost = 4'000'000'000'000'000'000;
+  const auto sane = [](std::int64_t number) { return number >= 0 && number < kMost; };
+  const int dof = experiment_.arm.dof();
+  const auto frame_fits = [&](const softarm_messages::tick_frame_t& frame) {
+    return frame.num_bodies == experiment_.arm.size() + 1 && frame.capture_ns > -kMost &&
+           frame.capture_ns < kMost;
+  };
+  std::size_t chambers = 0;
+  for (const auto& segment : experiment_.actuation.segments) chambers += segment.size();
+  return record.tick > 0 && sane(record.tick) && sane(record.first_ns) && sane(record.now_ns) &&
+         record.pressure_bar.size() == chambers &&
+         (record.dimension == 0 || record.dimension == dof) &&
+         std::all_of(record.frames.begin(), record.frames.end(), frame_fits);
 }
 
 void Replay::begin_run(const tick_record_t& first) {

@@ -110,6 +110,7 @@ class Replay {
   template <class Kind, class Tick>
   void keep(const LogEvent& event, Window<Kind>& window, Kind& incoming, Tick tick_of);
   void take_record(const LogEvent& event);
+  bool fits(const softarm_messages::tick_record_t& record) const;
   void begin_run(const softarm_messages::tick_record_t& first);
   void end_run();
   void advance(std::int64_t patience);

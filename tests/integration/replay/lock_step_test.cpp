@@ -2,11 +2,15 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <bit>
+#include <cstring>
 #include <filesystem>
+#include <memory>
 #include <sstream>
 
 #include "integration/replay/recorded_log.hpp"
 #include "replay/replay.hpp"
+#include "softarm/transport/message_decoding.hpp"
 
 namespace softarm {
 namespace {
@@ -69,6 +73,42 @@ TEST_F(LockStepReplay, ARunWithFaultsIsReproducedBitForBit) {
   }
   EXPECT_FALSE(summary.other_build);
   EXPECT_EQ(summary.recorded_build, "this build");
+}
+
+// The pipeline is a function of its inputs alone: not of what its memory held before, either.
+TEST_F(LockStepReplay, WhatMemoryHeldBeforeMakesNoDifference) {
+  struct alignas(ControlPipeline) Storage {
+    unsigned char bytes[sizeof(ControlPipeline)];
+  };
+  std::vector<std::uint64_t> expected;
+  for (const int filling : {0x00, 0x5a, 0xff}) {
+    const auto storage = std::make_unique<Storage>();
+    std::memset(storage->bytes, filling, sizeof storage->bytes);
+    __asm__ volatile("" : : "r"(storage.get()) : "memory");  // or the filling is left out
+    const std::unique_ptr<ControlPipeline, void (*)(ControlPipeline*)> pipeline(
+        new (storage.get()) ControlPipeline(experiment_),
+        [](ControlPipeline* p) { std::destroy_at(p); });
+    std::istringstream stream(log_.bytes);
+    EventLogReader log(stream);
+    softarm_messages::tick_record_t record{};
+    RecordedInput input;
+    std::vector<std::uint64_t> said;
+    std::int64_t tick = 0;
+    for (LogEvent event; log.next(event);) {
+      if (event.channel != experiment_.daemon.lcm.tick_channel) continue;
+      ASSERT_TRUE(decode(event.data, record));
+      if (record.tick <= tick) continue;  // its repetition
+      tick = record.tick;
+      const TickOutput& output = pipeline->tick(input.from(record));
+      for (const double each : output.pressure_bar)
+        said.push_back(std::bit_cast<std::uint64_t>(each));
+      for (const double each : output.motion.u_rad)
+        said.push_back(std::bit_cast<std::uint64_t>(each));
+    }
+    EXPECT_EQ(tick, run_.ticks);
+    if (expected.empty()) expected = said;
+    EXPECT_EQ(said, expected) << "memory filled with " << filling;
+  }
 }
 
 TEST_F(LockStepReplay, TorquesAndShadowToo) {
@@ -192,6 +232,15 @@ TEST_F(LockStepReplay, AnotherConfigurationIsRefusedOrComparedOnDemand) {
   };
   EXPECT_TRUE(has("tick.command"));
   EXPECT_TRUE(has("status.tau_actuation_nm"));
+}
+
+TEST_F(LockStepReplay, RecordsOfAnotherArmAreNoInput) {
+  const Experiment other =
+      load_experiment(std::filesystem::path(SOFTARM_SOURCE_DIR) / "config" / "one_segment.yaml");
+  const ReplaySummary summary = replay(log_.bytes, other, true).summary;
+  EXPECT_EQ(summary.ticks, 0);
+  EXPECT_EQ(summary.malformed, 2 * run_.ticks);
+  EXPECT_FALSE(summary.complete());
 }
 
 }  // namespace

@@ -38,9 +38,9 @@ class ReplayOfProcesses : public ::testing::Test {
     url_ = "udpm://239.255.76.67:" + std::to_string(20000 + getpid() % 40000) + "?ttl=0";
     config_ = folder_ / "config.yaml";
     log_ = folder_ / "log";
-    std::ofstream(config_) << "include: "
-                           << std::filesystem::path(SOFTARM_SOURCE_DIR) / "config/paper_arm.yaml"
-                           << "\nname: under_test\ndaemon:\n  lcm: {url: \"" << url_ << "\"}\n";
+    experiment_.daemon.lcm.url = url_;
+    std::ofstream(config_) << resolved_text(
+        experiment_);  // all of it: nothing may change meanwhile
     try {
       node_ = std::make_unique<LcmNode>(url_);
       node_->subscribe("SOFTARM_STATUS", 4096, [this](const ReceivedMessage& packet) {
@@ -96,8 +96,8 @@ class ReplayOfProcesses : public ::testing::Test {
       ASSERT_TRUE(reach(Mode::active)) << daemon->printed();
       occlude();
       ASSERT_TRUE(reach(Mode::active)) << daemon->printed();
-      ASSERT_EQ(start("softarm", {"disarm", config_})->wait(10s), 0);
-      ASSERT_EQ(start("softarm", {"arm", config_})->wait(10s), 0);
+      ASSERT_EQ(start("softarm", {"disarm", config_})->wait(60s), 0);
+      ASSERT_EQ(start("softarm", {"arm", config_})->wait(60s), 0);
       ASSERT_TRUE(reach(Mode::active)) << daemon->printed();
       plant->signal(SIGKILL);
       ASSERT_TRUE(reach(Mode::vent)) << daemon->printed();
@@ -159,6 +159,8 @@ class ReplayOfProcesses : public ::testing::Test {
     file.put(static_cast<char>(byte ^ mask));
   }
 
+  Experiment experiment_ =
+      load_experiment(std::filesystem::path(SOFTARM_SOURCE_DIR) / "config/paper_arm.yaml");
   std::filesystem::path folder_, config_, log_;
   std::string url_, printed_, daemon_printed_;
   std::unique_ptr<LcmNode> node_;
@@ -203,7 +205,8 @@ TEST_F(ReplayOfProcesses, RecordedWithFaultsIsBitExactAndDamageIsTold) {
   EXPECT_NE(printed_.find("INCOMPLETE"), std::string::npos) << printed_;
 
   // Another configuration.
-  std::ofstream(config_, std::ios::app) << "  rate_hz: 400\n";
+  experiment_.daemon.rate_hz = 400.0;
+  std::ofstream(config_) << resolved_text(experiment_);
   EXPECT_EQ(replay(), 78) << printed_;
   EXPECT_NE(printed_.find("--any-configuration"), std::string::npos);
   EXPECT_EQ(replay({"--any-configuration"}), 2) << printed_;
@@ -215,7 +218,7 @@ TEST_F(ReplayOfProcesses, PlayedByLcmLogplayerTheFramesMakeAFreshDaemonActive) {
     const auto plant = start("softarm-plant", {config_});
     const auto daemon = start("softarmd", {config_});
     ASSERT_TRUE(reach(Mode::active)) << daemon->printed();
-    go_on(1.0);
+    go_on(3.0);
     daemon->signal(SIGTERM);
     ASSERT_EQ(daemon->wait(5s), 0);
     go_on(0.3);
