@@ -57,16 +57,14 @@ class ValvesProgram : public ::testing::Test {
   void write_config(int port, const std::string& valves = "", const std::string& safety = "") {
     config_ = folder_ / "config.yaml";
     // A machine that is busy with other things must not look like a faulty terminal.
-    std::ofstream(config_) << "include: "
-                           << std::filesystem::path(SOFTARM_SOURCE_DIR) /
-                                  "config/paper_arm_modbus.yaml"
-                           << "\nname: under_test\ndaemon:\n  lcm: {url: \"" << url_
-                           << "\"}\n  safety: {valve_readback: false" << safety
-                           << "}\nvalves: {port: " << port << ", failsafe_timeout_s: 0.3"
-                           << (valves.find("rate_hz") == std::string::npos
-                                   ? ", rate_hz: 20, response_timeout_s: 0.049"
-                                   : "")
-                           << valves << "}\n";
+    std::ofstream(config_)
+        << "include: " << std::filesystem::path(SOFTARM_SOURCE_DIR) / "config/paper_arm_modbus.yaml"
+        << "\nname: under_test\ndaemon:\n  lcm: {url: \"" << url_
+        << "\"}\n  safety: {valve_readback: false" << safety << "}\nvalves: {port: " << port
+        << ", failsafe_timeout_s: 0.3, tolerated_failures: 2"
+        << (valves.find("rate_hz") == std::string::npos ? ", rate_hz: 20, response_timeout_s: 0.049"
+                                                        : "")
+        << valves << "}\n";
   }
 
   std::unique_ptr<Process> start(const std::string& program,
