@@ -20,6 +20,10 @@ bool LockStep::step(LogRow& row, bool logged) {
   TickInput input;
   input.now_ns = now_ns;
   input.frames = frames_;
+  input.newest_go_ns = now_ns;  // nobody has to hold a button while nothing moves
+  measured_ = arm_.measured_pressures_bar();
+  input.newest_measurement_ns = now_ns;
+  input.measured_bar = &measured_;
   const TickOutput& output = pipeline_.tick(input);
   tick_times_.add_ns(monotonic_now_ns() - before_ns);
 

@@ -38,6 +38,7 @@ class LockStep {
   SimulatedArm arm_;
   std::vector<MocapFrame> frames_;
   std::vector<double> pressures_;
+  PressureVector measured_;
   std::int64_t ticks_ = 0;
   DurationHistogram tick_times_;
 };

@@ -16,8 +16,8 @@
 namespace softarm {
 namespace {
 
-/// Hands mode changes from the tick's thread to one that may wait for a terminal or a journal.
-/// Bounded: what does not fit is counted, not queued.
+/// Hands mode changes, and what was refused, from the tick's thread to one that may wait for a
+/// terminal or a journal. Bounded: what does not fit is counted, not queued.
 class ModeLog {
  public:
   ModeLog() : thread_([this](const std::stop_token& stop) { print_until(stop); }) {}
@@ -35,13 +35,30 @@ class ModeLog {
     head_.store(head + 1, std::memory_order_release);
   }
 
+  /// How many messages were refused so far.
+  void malformed(std::int64_t total) noexcept {
+    malformed_.store(total, std::memory_order_relaxed);
+  }
+
  private:
   static constexpr std::size_t kCapacity = 64;
+  static constexpr std::int64_t kTellEvery_ns = 1'000'000'000;
   struct Entry {
     std::int64_t since_start_ns;
     Mode mode;
     Reason reason;
   };
+
+  /// What is malformed comes at any rate; it is told once a second at most.
+  void print_malformed(bool last) {
+    const std::int64_t total = malformed_.load(std::memory_order_relaxed);
+    const std::int64_t now_ns = monotonic_now_ns();
+    if (total == malformed_told_ || (!last && now_ns - malformed_told_ns_ < kTellEvery_ns)) return;
+    say(fmt::format("softarmd: {} malformed messages refused, {} in all\n", total - malformed_told_,
+                    total));
+    malformed_told_ = total;
+    malformed_told_ns_ = now_ns;
+  }
 
   void print_until(const std::stop_token& stop) {
     while (true) {
@@ -55,6 +72,7 @@ class ModeLog {
       }
       if (const auto lost = lost_.exchange(0); lost > 0)
         say(fmt::format("softarmd: {} mode changes came too fast to be printed\n", lost));
+      print_malformed(last);
       if (last) return;
       std::this_thread::sleep_for(std::chrono::milliseconds(50));
     }
@@ -62,7 +80,8 @@ class ModeLog {
 
   std::array<Entry, kCapacity> entries_{};
   std::atomic<std::size_t> head_{0}, tail_{0};
-  std::atomic<std::int64_t> lost_{0};
+  std::atomic<std::int64_t> lost_{0}, malformed_{0};
+  std::int64_t malformed_told_ = 0, malformed_told_ns_ = 0;
   std::jthread thread_;
 };
 
@@ -77,12 +96,13 @@ class DaemonLoop {
                .seed = experiment.seed,
                .build = build_text()},
               shadow),
-        judge_overruns_(experiment.daemon.realtime.fifo),
         ticks_per_second_(static_cast<std::int64_t>(experiment.daemon.rate_hz)),
         log_{.log = log} {}
 
   /// Returns once a stop was requested and every pressure has been commanded to zero.
   void run() {
+    // Without SCHED_FIFO, or where it was refused, overruns say nothing about the daemon.
+    judge_overruns_ = runs_under_fifo();
     const std::int64_t start_ns = monotonic_now_ns();
     PeriodicDeadline deadline(pipeline_.period_ns(), start_ns);
     int vented_commands = 0;
@@ -95,7 +115,9 @@ class DaemonLoop {
       log_.changed(woken_ns - start_ns, pipeline_.output());
       const std::int64_t missed = deadline.advance(monotonic_now_ns());
       timing_.overruns += missed;
-      consecutive_overruns_ = missed > 0 ? consecutive_overruns_ + 1 : 0;
+      missed_in_row_ =
+          missed > 0 ? missed_in_row_ + static_cast<int>(std::min(missed, kManyMissed)) : 0;
+      log_.log.malformed(link_.malformed());
       if (stop_requested != 0 && pipeline_.output().reason == Reason::shutdown &&
           pipeline_.fully_vented())
         ++vented_commands;
@@ -112,11 +134,12 @@ class DaemonLoop {
   /// Zero commands sent before leaving: one may be lost on the wire.
   static constexpr int kLastCommands = 3;
   static constexpr std::int64_t kRepeatPause_ns = 500'000;
+  static constexpr std::int64_t kManyMissed = 1'000'000;  ///< more are no worse, and fit an int
 
   void tick(std::int64_t woken_ns) noexcept {
     TickInput input = link_.collect(woken_ns);
     input.shutdown = stop_requested != 0;
-    input.consecutive_overruns = judge_overruns_ ? consecutive_overruns_ : 0;
+    input.consecutive_overruns = judge_overruns_ ? missed_in_row_ : 0;
     const TickOutput& output = pipeline_.tick(input);
     const std::int64_t decided_ns = monotonic_now_ns();
     link_.publish_command(decided_ns, output);
@@ -144,9 +167,9 @@ class DaemonLoop {
 
   ControlPipeline pipeline_;
   DaemonLink link_;
-  bool judge_overruns_;
+  bool judge_overruns_ = false;
   std::int64_t ticks_per_second_;
-  int consecutive_overruns_ = 0;
+  int missed_in_row_ = 0;
   LoopTiming timing_;
   ModeWatch log_;
 };

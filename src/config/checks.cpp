@@ -193,6 +193,11 @@ class Checks {
             fmt::format("at least frame_latency_s ({} s)", safety.frame_latency_s),
             fmt::format("{} s", safety.max_latency_s));
     const double period_s = 1.0 / experiment_.daemon.rate_hz;
+    for (const auto& [key, time_s] : {std::pair{"valve_silence_s", safety.valve_silence_s},
+                                      std::pair{"deadman_timeout_s", safety.deadman_timeout_s}})
+      require(time_s >= 2.0 * period_s, fmt::format("daemon.safety.{}", key),
+              fmt::format("at least two ticks of daemon.rate_hz ({:.6g} s)", 2.0 * period_s),
+              fmt::format("{} s", time_s));
     require(experiment_.daemon.lcm.command_validity_s >= 2.0 * period_s,
             "daemon.lcm.command_validity_s",
             fmt::format("at least two ticks of daemon.rate_hz ({:.6g} s)", 2.0 * period_s),
@@ -211,7 +216,8 @@ class Checks {
         {"timing_channel", lcm.timing_channel},
         {"tick_channel", lcm.tick_channel},
         {"valves_channel", lcm.valves_channel},
-        {"plant_channel", lcm.plant_channel}};
+        {"plant_channel", lcm.plant_channel},
+        {"deadman_channel", lcm.deadman_channel}};
     std::set<std::string> seen;
     for (const auto& [key, name] : channels) {
       if (name.empty()) continue;  // what may be left out

@@ -133,12 +133,34 @@ void describe_safety(SchemaVisitor& visitor, SafetySettings& safety) {
                    "identical poses in a row while the command changes: HOLD; 0: not checked",
                    from_to(0, 1000000)},
                   safety.frozen_frames);
-  visitor.integer({"hold_overruns", "", "missed ticks in a row, judged only with SCHED_FIFO",
+  visitor.integer({"hold_overruns", "", "ticks missed in a row: HOLD; judged only with SCHED_FIFO",
                    from_to(1, 1000000)},
                   safety.hold_overruns);
-  visitor.integer({"vent_overruns", "", "the same", from_to(1, 1000000)}, safety.vent_overruns);
-  visitor.flag({"valve_readback", "", "valves publish pressures; 100 ms of silence is a fault"},
-               safety.valve_readback);
+  visitor.integer({"vent_overruns", "", "the same: VENT", from_to(1, 1000000)},
+                  safety.vent_overruns);
+  visitor.flag({"valve_readback", "", "valves publish measured pressures"}, safety.valve_readback);
+  visitor.number(
+      {"valve_silence_s", "s", "without any measured pressure: FAULT", above_to(0.0, 10.0)},
+      safety.valve_silence_s);
+  visitor.number({"pressure_tolerance_bar", "bar",
+                  "measured pressures further outside the range lately commanded: FAULT (burst, "
+                  "leak); 0: not checked",
+                  from_to(0.0, 100.0)},
+                 safety.pressure_tolerance_bar);
+  visitor.number({"pressure_settling_s", "s",
+                  "how far back, at least, that range goes: longer than valves and tubes take",
+                  above_to(0.0, 10.0)},
+                 safety.pressure_settling_s);
+  visitor.number(
+      {"curvature_residual_nm", "N m",
+       "|K u + G - A tau_A| of a segment above it: FAULT; 0: not checked", from_to(0.0, 1e4)},
+      safety.curvature_residual_nm);
+  visitor.number(
+      {"curvature_settling_s", "s", "for so long without interruption", above_to(0.0, 100.0)},
+      safety.curvature_settling_s);
+  visitor.number(
+      {"deadman_timeout_s", "s", "without a go on lcm.deadman_channel: VENT", above_to(0.0, 10.0)},
+      safety.deadman_timeout_s);
 }
 
 void describe_lcm(SchemaVisitor& visitor, LcmSettings& lcm) {
@@ -161,6 +183,9 @@ void describe_lcm(SchemaVisitor& visitor, LcmSettings& lcm) {
       lcm.tick_channel);
   channel("valves_channel", "status of the valves' driver", lcm.valves_channel);
   channel("plant_channel", "a simulated arm's true state", lcm.plant_channel);
+  visitor.text(
+      {"deadman_channel", "", "go of a dead-man input; \"\": there is none", from_to(0, 63)},
+      lcm.deadman_channel);
   visitor.number({"command_validity_s", "s", "after which the valve side vents by itself",
                   above_to(0.0, 10.0)},
                  lcm.command_validity_s);

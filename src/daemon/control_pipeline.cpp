@@ -6,7 +6,7 @@
 namespace softarm {
 namespace {
 
-constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::min();
+constexpr std::int64_t kNever = SafetyInput::kNever;
 /// The arm may overshoot what its reference may not exceed, by so much.
 constexpr double kSoftLimitMargin = 1.1;
 /// A command that has moved by so much must move the arm, unless the poses are frozen.
@@ -29,7 +29,10 @@ ControlPipeline::ControlPipeline(const PipelineSettings& settings)
       controller_(settings.arm, settings.control),
       allocator_(settings.actuation),
       ramps_(settings.actuation),
+      pressure_watch_(settings.daemon.safety, allocator_.chambers()),
+      curvature_watch_(settings.daemon.safety, settings.arm),
       previous_bar_(PressureVector::Zero(allocator_.chambers())),
+      previous_tau_nm_(SegmentVector::Zero(settings.arm.dof())),
       pressure_at_last_motion_bar_(previous_bar_) {
   seen_ns_.fill(kNever);
   output_.pressure_bar = previous_bar_;
@@ -44,6 +47,7 @@ const TickOutput& ControlPipeline::tick(const TickInput& input) noexcept {
   const std::int64_t act_ns = input.now_ns + period_ns_ / 2;
   predict(act_ns);
   safety.motion_unknown = !output_.motion.all_valid();
+  watch(input, safety);
 
   const Mode before = safety_.mode();
   const Mode mode = safety_.step(safety);
@@ -62,6 +66,7 @@ const TickOutput& ControlPipeline::tick(const TickInput& input) noexcept {
     control();
   }
   limit(mode);
+  pressure_watch_.command(input.now_ns, output_.pressure_bar);
 
   output_.mode = mode;
   output_.reason = safety_.reason();
@@ -78,6 +83,8 @@ void ControlPipeline::validate_and_estimate(const TickInput& input, SafetyInput&
   if (gap) {
     validator_.reset();
     filter_.reset();
+    pressure_watch_.reset();
+    curvature_watch_.reset();
   }
   const std::int64_t max_latency_ns = to_ns(settings_.daemon.safety.max_latency_s);
   for (const MocapFrame& frame : input.frames) {
@@ -110,13 +117,32 @@ void ControlPipeline::validate_and_estimate(const TickInput& input, SafetyInput&
   safety.fully_vented = fully_vented();
   safety.consecutive_overruns = input.consecutive_overruns;
   safety.newest_measurement_ns = input.newest_measurement_ns;
+  safety.deadman_used = !settings_.daemon.lcm.deadman_channel.empty();
+  safety.newest_go_ns = input.newest_go_ns;
   safety.arm = input.arm;
   safety.disarm = input.disarm;
+  safety.emergency_stop = input.emergency_stop;
   safety.shutdown = input.shutdown;
   output_.soft_limit = safety.soft_limit_exceeded;
   output_.frame_age_s = newest_capture_ns_ == 0
                             ? std::numeric_limits<double>::quiet_NaN()
                             : 1e-9 * static_cast<double>(input.now_ns - newest_capture_ns_);
+}
+
+void ControlPipeline::watch(const TickInput& input, SafetyInput& safety) noexcept {
+  if (input.measured_bar != nullptr && input.measured_bar->size() == previous_bar_.size())
+    pressure_watch_.measure(*input.measured_bar);
+  safety.pressure_mismatch = settings_.daemon.safety.valve_readback && pressure_watch_.strays();
+  if (!curvature_watch_.used()) return;
+  // What is judged is the balance of an arm that is watched and told what to do.
+  const bool under_control = safety_.mode() == Mode::active || safety_.mode() == Mode::hold;
+  if (under_control && !safety.motion_unknown) {
+    allocator_.torque(previous_bar_, previous_tau_nm_);
+    curvature_watch_.judge(input.now_ns, output_.motion.u_rad, previous_tau_nm_);
+  } else {
+    curvature_watch_.reset();
+  }
+  safety.curvature_mismatch = curvature_watch_.strays();
 }
 
 void ControlPipeline::use_frame(const MocapFrame& frame) noexcept {

@@ -58,6 +58,12 @@ std::vector<std::string> apply_realtime_settings(const RealtimeSettings& setting
   return refused;
 }
 
+bool runs_under_fifo() noexcept {
+  int policy = 0;
+  sched_param parameter{};
+  return pthread_getschedparam(pthread_self(), &policy, &parameter) == 0 && policy == SCHED_FIFO;
+}
+
 InstanceLock::InstanceLock(const std::string& name) {
   sockaddr_un address{};
   address.sun_family = AF_UNIX;

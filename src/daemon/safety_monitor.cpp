@@ -16,55 +16,84 @@ struct Evidence {
   std::int64_t frame_age_ns;
   std::int64_t tick_gap_ns;
   std::int64_t measurement_age_ns;
+  std::int64_t go_age_ns;
+
+  /// Pressure is commanded, or may be in the next tick.
+  bool pressurised() const {
+    return mode == Mode::active || mode == Mode::hold || !input.fully_vented;
+  }
+  bool valves_silent() const {
+    return settings.valve_readback && measurement_age_ns > thresholds.valve_silence_ns;
+  }
 };
 
-/// Overruns are judged only under SCHED_FIFO (consecutive_overruns is zero otherwise): without it
-/// they are only counted.
 struct Cause {
-  Reason reason;
-  Mode demands;
+  CauseRule rule;
   bool (*present)(const Evidence&);
 };
 
-/// Every cause, the most severe first. A cause is cleared when it is no longer present; `shutdown`
-/// never is, and a fault stays latched until an operator disarms.
+/// Every cause, the most severe first: `shutdown` because nothing follows it, then by what they
+/// demand. Valves that are silent or do not follow are a fault where there is pressure; where there
+/// is none they only keep the arm from becoming active, so that valves may be switched on after the
+/// daemon. Overruns are ticks missed in a row, and judged only under SCHED_FIFO
+/// (consecutive_overruns is zero otherwise): without it they are only counted.
 constexpr std::array kCauses{
-    Cause{Reason::valves_silent, Mode::fault,
+    Cause{{Reason::shutdown, Mode::vent, Clearance::never},
+          [](const Evidence& e) { return e.input.shutdown; }},
+    Cause{{Reason::emergency_stop, Mode::fault, Clearance::disarm_then_arm},
+          [](const Evidence& e) { return e.input.emergency_stop; }},
+    Cause{{Reason::valves_silent, Mode::fault, Clearance::disarm_then_arm},
+          [](const Evidence& e) { return e.valves_silent() && e.pressurised(); }},
+    Cause{{Reason::pressure_mismatch, Mode::fault, Clearance::disarm_then_arm},
+          [](const Evidence& e) { return e.input.pressure_mismatch && e.pressurised(); }},
+    Cause{{Reason::curvature_mismatch, Mode::fault, Clearance::disarm_then_arm},
+          [](const Evidence& e) { return e.input.curvature_mismatch; }},
+    Cause{{Reason::disarmed, Mode::vent, Clearance::arm},
+          [](const Evidence& e) { return e.input.disarm; }},
+    Cause{{Reason::deadman_released, Mode::vent, Clearance::arm},
           [](const Evidence& e) {
-            return e.settings.valve_readback && e.mode == Mode::active &&
-                   e.measurement_age_ns > e.thresholds.valve_silence_ns;
+            return e.input.deadman_used && e.go_age_ns > e.thresholds.deadman_timeout_ns;
           }},
-    Cause{Reason::shutdown, Mode::vent, [](const Evidence& e) { return e.input.shutdown; }},
-    Cause{Reason::disarmed, Mode::vent, [](const Evidence& e) { return e.input.disarm; }},
-    Cause{Reason::time_gap, Mode::vent,
+    Cause{{Reason::valves_silent, Mode::vent, Clearance::good_frames},
+          [](const Evidence& e) { return e.valves_silent(); }},
+    Cause{{Reason::pressure_mismatch, Mode::vent, Clearance::good_frames},
+          [](const Evidence& e) { return e.input.pressure_mismatch; }},
+    Cause{{Reason::time_gap, Mode::vent, Clearance::good_frames},
           [](const Evidence& e) { return e.tick_gap_ns > e.thresholds.vent_after_ns; }},
-    Cause{Reason::sender_restarted, Mode::vent,
+    Cause{{Reason::sender_restarted, Mode::vent, Clearance::good_frames},
           [](const Evidence& e) { return e.input.sender_restarted; }},
-    Cause{Reason::frames_stale, Mode::vent,
+    Cause{{Reason::frames_stale, Mode::vent, Clearance::good_frames},
           [](const Evidence& e) { return e.frame_age_ns > e.thresholds.vent_after_ns; }},
-    Cause{Reason::soft_limit, Mode::vent,
+    Cause{{Reason::soft_limit, Mode::vent, Clearance::arm},
           [](const Evidence& e) { return e.input.soft_limit_exceeded; }},
-    Cause{Reason::many_overruns, Mode::vent,
+    Cause{{Reason::many_overruns, Mode::vent, Clearance::good_frames},
           [](const Evidence& e) {
             return e.settings.vent_overruns > 0 &&
                    e.input.consecutive_overruns >= e.settings.vent_overruns;
           }},
-    Cause{Reason::frames_late, Mode::hold,
+    Cause{{Reason::frames_late, Mode::hold, Clearance::good_frames},
           [](const Evidence& e) {
             return e.input.motion_unknown || e.frame_age_ns > e.thresholds.hold_after_ns;
           }},
-    Cause{Reason::poses_frozen, Mode::hold, [](const Evidence& e) { return e.input.poses_frozen; }},
-    Cause{Reason::overruns, Mode::hold,
+    Cause{{Reason::poses_frozen, Mode::hold, Clearance::good_frames},
+          [](const Evidence& e) { return e.input.poses_frozen; }},
+    Cause{{Reason::overruns, Mode::hold, Clearance::good_frames},
           [](const Evidence& e) {
             return e.settings.hold_overruns > 0 &&
                    e.input.consecutive_overruns >= e.settings.hold_overruns;
           }},
 };
 
-/// a - b without overflow where b is "never" (the smallest number).
+constexpr auto kRules = [] {
+  std::array<CauseRule, kCauses.size()> rules{};
+  for (std::size_t k = 0; k < rules.size(); ++k) rules[k] = kCauses[k].rule;
+  return rules;
+}();
+
+/// now - then without overflow where `then` is never.
 std::int64_t age(std::int64_t now_ns, std::int64_t then_ns) noexcept {
-  constexpr auto kNever = std::numeric_limits<std::int64_t>::min();
-  return then_ns == kNever ? std::numeric_limits<std::int64_t>::max() : now_ns - then_ns;
+  return then_ns == SafetyInput::kNever ? std::numeric_limits<std::int64_t>::max()
+                                        : now_ns - then_ns;
 }
 
 /// The values named may come off the wire.
@@ -74,6 +103,8 @@ const char* name_of(Enumeration value, const std::array<const char*, count>& nam
   return index < count ? names[index] : "unknown";
 }
 
+std::int64_t to_ns(double time_s) noexcept { return std::llround(time_s * 1e9); }
+
 }  // namespace
 
 const char* name(Mode mode) noexcept {
@@ -82,12 +113,30 @@ const char* name(Mode mode) noexcept {
 }
 
 const char* name(Reason reason) noexcept {
-  constexpr std::array kNames{
-      "none",         "starting",      "waiting_for_frames", "waiting_for_arm",  "frames_late",
-      "poses_frozen", "overruns",      "frames_stale",       "sender_restarted", "soft_limit",
-      "time_gap",     "many_overruns", "disarmed",           "shutdown",         "valves_silent"};
+  constexpr std::array kNames{"none",
+                              "starting",
+                              "waiting_for_frames",
+                              "waiting_for_arm",
+                              "frames_late",
+                              "poses_frozen",
+                              "overruns",
+                              "frames_stale",
+                              "sender_restarted",
+                              "soft_limit",
+                              "time_gap",
+                              "many_overruns",
+                              "disarmed",
+                              "shutdown",
+                              "valves_silent",
+                              "emergency_stop",
+                              "deadman_released",
+                              "pressure_mismatch",
+                              "curvature_mismatch"};
+  static_assert(kNames.size() == static_cast<std::size_t>(kReasons));
   return name_of(reason, kNames);
 }
+
+std::span<const CauseRule> cause_table() noexcept { return kRules; }
 
 SafetyThresholds resolve_thresholds(const SafetySettings& settings,
                                     double control_period_s) noexcept {
@@ -99,7 +148,10 @@ SafetyThresholds resolve_thresholds(const SafetySettings& settings,
       settings.vent_after_s > 0.0
           ? settings.vent_after_s
           : std::max({0.1, 10.0 * settings.frame_period_s, 3.0 * control_period_s});
-  return {.hold_after_ns = std::llround(hold_s * 1e9), .vent_after_ns = std::llround(vent_s * 1e9)};
+  return {.hold_after_ns = to_ns(hold_s),
+          .vent_after_ns = to_ns(vent_s),
+          .valve_silence_ns = to_ns(settings.valve_silence_s),
+          .deadman_timeout_ns = to_ns(settings.deadman_timeout_s)};
 }
 
 SafetyMonitor::SafetyMonitor(const SafetySettings& settings, double control_period_s) noexcept
@@ -107,7 +159,7 @@ SafetyMonitor::SafetyMonitor(const SafetySettings& settings, double control_peri
       thresholds_(resolve_thresholds(settings, control_period_s)),
       armed_(settings.arming == Arming::automatic) {}
 
-SafetyMonitor::Verdict SafetyMonitor::worst_cause(const SafetyInput& input) const noexcept {
+CauseRule SafetyMonitor::worst_cause(const SafetyInput& input) const noexcept {
   const bool ticked_before = mode_ != Mode::init;
   const Evidence evidence{.input = input,
                           .settings = settings_,
@@ -115,25 +167,27 @@ SafetyMonitor::Verdict SafetyMonitor::worst_cause(const SafetyInput& input) cons
                           .mode = mode_,
                           .frame_age_ns = age(input.now_ns, input.newest_capture_ns),
                           .tick_gap_ns = ticked_before ? input.now_ns - previous_tick_ns_ : 0,
-                          .measurement_age_ns = age(input.now_ns, input.newest_measurement_ns)};
+                          .measurement_age_ns = age(input.now_ns, input.newest_measurement_ns),
+                          .go_age_ns = age(input.now_ns, input.newest_go_ns)};
   for (const Cause& cause : kCauses)
-    if (cause.present(evidence)) return {cause.demands, cause.reason};
-  return {Mode::active, Reason::none};
+    if (cause.present(evidence)) return cause.rule;
+  return {Reason::none, Mode::active, Clearance::good_frames};
 }
 
 void SafetyMonitor::take_operator_requests(const SafetyInput& input, Mode demanded) noexcept {
   // Armed is granted for what the operator sees now, never stored up for when a cause has gone.
-  if (input.arm && demanded < Mode::vent) armed_ = true;
+  if (input.arm && demanded < Mode::vent && mode_ != Mode::fault) armed_ = true;
   if (input.disarm || input.shutdown) armed_ = false;
 }
 
-void SafetyMonitor::enter(Mode mode, Reason reason) noexcept {
-  // A vent or a fault takes the arming back. With automatic arming it comes back by itself, but not
-  // to an arm that ran beyond its limits: it would do so again and again.
-  const bool always = mode == Mode::fault || reason == Reason::soft_limit;
-  if (mode >= Mode::vent && (always || settings_.arming == Arming::explicit_)) armed_ = false;
-  mode_ = mode;
-  reason_ = reason;
+void SafetyMonitor::enter(const CauseRule& cause) noexcept {
+  // With automatic arming a vent gives the arming back by itself, but not to an arm that ran beyond
+  // its limits (it would do so again and again), nor against a person's will.
+  if (cause.demands >= Mode::vent &&
+      (cause.clearance != Clearance::good_frames || settings_.arming == Arming::explicit_))
+    armed_ = false;
+  mode_ = cause.demands;
+  reason_ = cause.reason;
 }
 
 void SafetyMonitor::try_to_activate(const SafetyInput& input, Reason otherwise) noexcept {
@@ -144,20 +198,24 @@ void SafetyMonitor::try_to_activate(const SafetyInput& input, Reason otherwise) 
   } else if (!armed_) {
     reason_ = Reason::waiting_for_arm;
   } else {
-    enter(Mode::active, Reason::none);
+    mode_ = Mode::active;
+    reason_ = Reason::none;
   }
 }
 
 Mode SafetyMonitor::step(const SafetyInput& input) noexcept {
-  const Verdict verdict = worst_cause(input);
-  take_operator_requests(input, verdict.demands);
+  const CauseRule worst = worst_cause(input);
+  take_operator_requests(input, worst.demands);
   previous_tick_ns_ = input.now_ns;
-  if (mode_ == Mode::init) enter(Mode::wait_frames, Reason::waiting_for_frames);
+  if (mode_ == Mode::init) {
+    mode_ = Mode::wait_frames;
+    reason_ = Reason::waiting_for_frames;
+  }
 
   // A run of good frames is one without a cause, a rejection or a gap, and begins anew with the arm
   // vented: until then it is moving.
-  const bool still_venting = mode_ == Mode::vent && !input.fully_vented;
-  if (verdict.demands > Mode::active || input.bad_frames > 0 || still_venting) {
+  const bool still_venting = mode_ >= Mode::vent && !input.fully_vented;
+  if (worst.demands > Mode::active || input.bad_frames > 0 || still_venting) {
     good_in_a_row_ = 0;
   } else {
     good_in_a_row_ = std::min(good_in_a_row_ + input.good_frames, settings_.good_frames);
@@ -166,32 +224,34 @@ Mode SafetyMonitor::step(const SafetyInput& input) noexcept {
   switch (mode_) {
     case Mode::init:
     case Mode::wait_frames:
-      // Nothing is pressurised: only what latches matters, the rest is waiting.
-      if (verdict.reason == Reason::shutdown) {
-        enter(Mode::vent, verdict.reason);
+      if (worst.demands == Mode::fault || worst.clearance == Clearance::never) {
+        enter(worst);
       } else {
-        try_to_activate(input, Reason::waiting_for_frames);
+        const bool by_frames = worst.demands < Mode::vent || worst.reason == Reason::frames_stale;
+        try_to_activate(input, by_frames ? Reason::waiting_for_frames : worst.reason);
       }
       break;
     case Mode::active:
     case Mode::hold:
-      if (verdict.demands > mode_ || (verdict.demands == mode_ && mode_ == Mode::hold)) {
-        enter(verdict.demands, verdict.reason);
+      if (worst.demands > Mode::active && worst.demands >= mode_) {
+        enter(worst);
       } else if (mode_ == Mode::hold) {
         try_to_activate(input, reason_);
       }
       break;
     case Mode::vent:
-      if (verdict.demands >= Mode::vent) {
-        enter(verdict.demands, verdict.reason);
-      } else if (verdict.demands == Mode::active) {
+      if (worst.demands >= Mode::vent) {
+        enter(worst);
+      } else if (worst.demands == Mode::active) {
         try_to_activate(input, reason_);
       }
       break;
     case Mode::fault:
-      // Disarming acknowledges the fault; the arm stays vented until it is armed again.
-      if (input.disarm || input.shutdown)
-        enter(Mode::vent, input.shutdown ? Reason::shutdown : Reason::disarmed);
+      // Disarming acknowledges a fault whose cause has gone; the arm stays vented until it is armed
+      // again. An emergency stop is told even where a fault came before it.
+      if (worst.reason == Reason::emergency_stop || worst.clearance == Clearance::never ||
+          (input.disarm && worst.demands < Mode::fault))
+        enter(worst);
       break;
   }
   return mode_;

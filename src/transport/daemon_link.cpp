@@ -13,7 +13,7 @@ namespace {
 /// What may arrive between two ticks; more is dropped by LCM and counted as missing.
 constexpr int kFrameCapacity = TickRecorder::kMostFrames;
 constexpr int kOtherCapacity = 16;
-constexpr int kMessagesPerTick = kFrameCapacity + 3 * kOtherCapacity;
+constexpr int kMessagesPerTick = kFrameCapacity + 4 * kOtherCapacity;
 constexpr auto kNever = std::numeric_limits<std::int64_t>::min();
 /// After so long a silence a sender of references or requests may begin its numbers anew.
 constexpr std::int64_t kNumberForgotten_ns = 500'000'000;
@@ -34,6 +34,8 @@ DaemonLink::DaemonLink(const PipelineSettings& settings, const Provenance& prove
       dof_(settings.arm.dof()),
       messages_(settings, provenance, shadow),
       newest_measurement_ns_(kNever),
+      newest_go_ns_(kNever),
+      go_sequence_(kNever),
       reference_sequence_(kNever),
       operator_sequence_(kNever) {
   if (!settings_.lcm.tick_channel.empty()) recorder_.emplace(settings, provenance, shadow);
@@ -45,6 +47,7 @@ DaemonLink::DaemonLink(const PipelineSettings& settings, const Provenance& prove
                      &reference_message_.acceleration_radps2})
     list->reserve(2 * kMaxSegments);
   measurement_message_.pressure_bar.reserve(kMaxChambers);
+  measured_bar_.setZero(std::ssize(messages_.pressure_command.pressure_bar));
 
   node_.subscribe(settings_.lcm.mocap_channel, kFrameCapacity,
                   [this](const auto& packet) { take_frame(packet); });
@@ -55,6 +58,9 @@ DaemonLink::DaemonLink(const PipelineSettings& settings, const Provenance& prove
   if (settings_.safety.valve_readback)
     node_.subscribe(settings_.lcm.measurement_channel, kOtherCapacity,
                     [this](const auto& packet) { take_measurement(packet); });
+  if (!settings_.lcm.deadman_channel.empty())
+    node_.subscribe(settings_.lcm.deadman_channel, kOtherCapacity,
+                    [this](const auto& packet) { take_go(packet); });
 }
 
 TickInput DaemonLink::collect(std::int64_t now_ns) noexcept {
@@ -67,6 +73,7 @@ TickInput DaemonLink::collect(std::int64_t now_ns) noexcept {
   node_.drain(kMessagesPerTick);
   input_.frames = {frames_.data(), frame_count_};
   input_.newest_measurement_ns = newest_measurement_ns_;
+  input_.newest_go_ns = newest_go_ns_;
   return input_;
 }
 
@@ -115,17 +122,37 @@ void DaemonLink::take_operator(const ReceivedMessage& packet) noexcept {
   if (newer) operator_sequence_ = operator_message_.sequence;
   newest_operator_ns_ = now_ns_;
   // Whoever wants the arm vented is right, whatever the number; so is a request nobody knows.
-  const bool arm = operator_message_.request == softarm_messages::operator_command_t::ARM;
-  input_.disarm |= !arm;
+  using Request = softarm_messages::operator_command_t;
+  const bool arm = operator_message_.request == Request::ARM;
+  const bool emergency = operator_message_.request == Request::EMERGENCY_STOP;
+  input_.emergency_stop |= emergency;
+  input_.disarm |= !arm && !emergency;
   input_.arm |= arm && newer;
 }
 
 void DaemonLink::take_measurement(const ReceivedMessage& packet) noexcept {
-  if (decode(packet.bytes, measurement_message_)) {
-    newest_measurement_ns_ = arrival_ns(packet);
-  } else {
+  const auto& measured = measurement_message_.pressure_bar;
+  if (!decode(packet.bytes, measurement_message_) || std::ssize(measured) != measured_bar_.size() ||
+      !std::all_of(measured.begin(), measured.end(),
+                   [](float bar) { return std::isfinite(bar); })) {
     ++malformed_;
+    return;
   }
+  newest_measurement_ns_ = arrival_ns(packet);
+  std::copy(measured.begin(), measured.end(), measured_bar_.begin());
+  // What the valves measure answers to whoever commands them: not to a shadow.
+  if (messages_.pressure_command.shadow == 0) input_.measured_bar = &measured_bar_;
+}
+
+void DaemonLink::take_go(const ReceivedMessage& packet) noexcept {
+  if (!decode(packet.bytes, deadman_message_)) {
+    ++malformed_;
+    return;
+  }
+  if (deadman_message_.go == 0) newest_go_ns_ = kNever;
+  if (deadman_message_.go == 0 || deadman_message_.sequence == go_sequence_) return;
+  go_sequence_ = deadman_message_.sequence;
+  newest_go_ns_ = arrival_ns(packet);
 }
 
 void DaemonLink::publish_command(std::int64_t now_ns, const TickOutput& output) noexcept {

@@ -114,12 +114,13 @@ bool decode(std::span<const std::byte> bytes, softarm_messages::timing_t& messag
 }
 
 bool decode(std::span<const std::byte> bytes, softarm_messages::tick_record_t& message) noexcept {
-  constexpr std::size_t kCounts = kHash + 5 * 8 + 4 + 4;  // numbers and flags come first
+  constexpr std::size_t kCounts = kHash + 6 * 8 + 4 + 5;  // numbers and flags come first
   const int chambers = bounded(length16_at(bytes, kCounts), kMaxChambers);
   const int dimension = bounded(length16_at(bytes, kCounts + 2), 2 * kMaxSegments);
   const int frames = bounded(length16_at(bytes, kCounts + 4), TickRecorder::kMostFrames);
-  if (chambers < 0 || dimension < 0 || frames < 0) return false;
-  std::size_t at = kCounts + 6 + 8 * static_cast<std::size_t>(chambers + 3 * dimension);
+  const int measured = bounded(length16_at(bytes, kCounts + 6), kMaxChambers);
+  if (chambers < 0 || dimension < 0 || frames < 0 || measured < 0) return false;
+  std::size_t at = kCounts + 8 + 8 * static_cast<std::size_t>(chambers + measured + 3 * dimension);
   for (int k = 0; k < frames; ++k) {
     const int bodies = bounded(length16_at(bytes, at + 2 * 8), kMaxBodies);
     if (bodies < 1) return false;
@@ -133,6 +134,10 @@ bool decode(std::span<const std::byte> bytes, softarm_messages::tick_record_t& m
 bool decode(std::span<const std::byte> bytes, softarm_messages::valves_status_t& message) noexcept {
   // Two lists of one length.
   return decode_list(bytes, 3 * 8 + 2 * 1 + 2 + 7 * 4, 2 * 4, kMaxChambers, message);
+}
+
+bool decode(std::span<const std::byte> bytes, softarm_messages::deadman_t& message) noexcept {
+  return decode_exactly(bytes, kHash + 8 + 1, message);
 }
 
 }  // namespace softarm

@@ -10,10 +10,10 @@ namespace {
 
 std::int16_t flags_of(const TickOutput& output, bool shadow) noexcept {
   const bool bits[] = {
-      output.saturated, output.slew_limited, output.reference_limited, output.soft_limit,
-      shadow,           output.armed};
+      output.saturated, output.slew_limited, output.reference_limited, output.soft_limit, shadow,
+      output.armed,     output.bounded};
   int flags = 0;
-  for (int k = 0; k < 6; ++k) flags |= bits[k] ? 1 << k : 0;
+  for (int k = 0; k < 7; ++k) flags |= bits[k] ? 1 << k : 0;
   return static_cast<std::int16_t>(flags);
 }
 

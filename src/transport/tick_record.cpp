@@ -80,6 +80,8 @@ tick_record_t largest_record(const PipelineSettings& settings, const std::string
   for (const auto& segment : settings.actuation.segments) chambers += segment.size();
   record.num_chambers = static_cast<std::int16_t>(chambers);
   record.pressure_bar.resize(chambers);
+  record.num_measured = record.num_chambers;
+  record.measured_bar.resize(chambers);
   record.dimension = static_cast<std::int16_t>(dof);
   for (auto* list : {&record.u_rad, &record.velocity_radps, &record.acceleration_radps2})
     list->resize(dof);
@@ -107,8 +109,8 @@ bool is_intact(std::span<const std::byte> encoded) noexcept {
 void to_record(const TickInput& input, tick_record_t& record) {
   // A new field of TickInput stops the build here: it belongs into lcmtypes/tick_record_t.lcm, into
   // this function, into RecordedInput::from and into the size that decode() checks.
-  const auto& [now_ns, frames, reference, arm, disarm, shutdown, consecutive_overruns,
-               newest_measurement_ns] = input;
+  const auto& [now_ns, frames, reference, arm, disarm, emergency_stop, shutdown,
+               consecutive_overruns, newest_measurement_ns, measured_bar, newest_go_ns] = input;
   record.now_ns = now_ns;
   record.num_frames = static_cast<std::int16_t>(frames.size());
   if (record.frames.size() < frames.size()) record.frames.resize(frames.size());
@@ -123,9 +125,17 @@ void to_record(const TickInput& input, tick_record_t& record) {
   }
   record.arm = arm ? 1 : 0;
   record.disarm = disarm ? 1 : 0;
+  record.emergency_stop = emergency_stop ? 1 : 0;
   record.shutdown = shutdown ? 1 : 0;
   record.consecutive_overruns = consecutive_overruns;
   record.newest_measurement_ns = newest_measurement_ns;
+  record.newest_go_ns = newest_go_ns;
+  record.num_measured = 0;
+  if (measured_bar != nullptr) {
+    record.num_measured = static_cast<std::int16_t>(measured_bar->size());
+    grow_to(record.measured_bar, static_cast<std::size_t>(measured_bar->size()));
+    std::copy(measured_bar->begin(), measured_bar->end(), record.measured_bar.begin());
+  }
 }
 
 const TickInput& RecordedInput::from(const tick_record_t& record) {
@@ -142,9 +152,16 @@ const TickInput& RecordedInput::from(const tick_record_t& record) {
   }
   input_.arm = record.arm != 0;
   input_.disarm = record.disarm != 0;
+  input_.emergency_stop = record.emergency_stop != 0;
   input_.shutdown = record.shutdown != 0;
   input_.consecutive_overruns = record.consecutive_overruns;
   input_.newest_measurement_ns = record.newest_measurement_ns;
+  input_.newest_go_ns = record.newest_go_ns;
+  if (record.num_measured > 0) {
+    measured_bar_ =
+        Eigen::Map<const Eigen::VectorXd>(record.measured_bar.data(), record.num_measured);
+    input_.measured_bar = &measured_bar_;
+  }
   return input_;
 }
 

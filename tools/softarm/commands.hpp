@@ -36,7 +36,7 @@ void add_run_command(CLI::App& app);
 /// softarm watch CONFIG [--out DIR] [--duration S]
 void add_watch_command(CLI::App& app);
 
-/// softarm arm CONFIG, softarm disarm CONFIG
+/// softarm arm CONFIG, softarm disarm CONFIG, softarm estop CONFIG, softarm deadman CONFIG
 void add_operator_commands(CLI::App& app);
 
 }  // namespace softarm

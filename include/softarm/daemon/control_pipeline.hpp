@@ -14,6 +14,7 @@
 #include "softarm/actuation/pressure_ramps.hpp"
 #include "softarm/control/curvature_controller.hpp"
 #include "softarm/control/reference.hpp"
+#include "softarm/daemon/following.hpp"
 #include "softarm/daemon/pipeline_settings.hpp"
 #include "softarm/daemon/safety_monitor.hpp"
 #include "softarm/estimation/curvature_filter.hpp"
@@ -33,10 +34,15 @@ struct TickInput {
   const LiveReferenceInput* reference = nullptr;  ///< the newest, if one came
   bool arm = false;
   bool disarm = false;
+  bool emergency_stop = false;
   bool shutdown = false;         ///< from now on: vent, and nothing else
-  int consecutive_overruns = 0;  ///< zero where they are not to be judged
+  int consecutive_overruns = 0;  ///< ticks missed in a row; zero where they are not to be judged
   /// Arrival of the newest pressure measurement, where the valves publish them.
-  std::int64_t newest_measurement_ns = std::numeric_limits<std::int64_t>::min();
+  std::int64_t newest_measurement_ns = SafetyInput::kNever;
+  /// The measured pressures (bar, one a chamber), if some came since the last tick.
+  const PressureVector* measured_bar = nullptr;
+  /// Arrival of the newest "go", where there is a dead-man input.
+  std::int64_t newest_go_ns = SafetyInput::kNever;
 };
 
 /// What the tick saw, decided and commands.
@@ -80,6 +86,7 @@ class ControlPipeline {
 
  private:
   void validate_and_estimate(const TickInput& input, SafetyInput& safety) noexcept;
+  void watch(const TickInput& input, SafetyInput& safety) noexcept;
   void use_frame(const MocapFrame& frame) noexcept;
   void predict(std::int64_t at_ns) noexcept;
   void expect(std::int64_t at_ns) noexcept;
@@ -102,6 +109,8 @@ class ControlPipeline {
   CurvatureController controller_;
   PressureAllocator allocator_;
   PressureRamps ramps_;
+  PressureWatch pressure_watch_;
+  CurvatureWatch curvature_watch_;
 
   TickOutput output_;
   ReferenceWindow window_;
@@ -109,6 +118,7 @@ class ControlPipeline {
   ControlOutput control_;
   Allocation allocation_;
   PressureVector previous_bar_;
+  SegmentVector previous_tau_nm_;               ///< that these give
   PressureVector pressure_at_last_motion_bar_;  ///< commanded when the poses last changed
   std::array<std::int64_t, kMaxSegments> seen_ns_{};
   std::int64_t epoch_ns_ = 0;

@@ -20,6 +20,9 @@ void sleep_until_ns(std::int64_t deadline_ns) noexcept;
 /// machine does not permit is left undone and reported: one line each, with the cure.
 std::vector<std::string> apply_realtime_settings(const RealtimeSettings& settings);
 
+/// Whether the calling thread runs under SCHED_FIFO.
+bool runs_under_fifo() noexcept;
+
 /// Absolute deadlines at a fixed period. Missed ones are skipped, never caught up with.
 class PeriodicDeadline {
  public:

@@ -25,9 +25,19 @@ struct SafetySettings {
   int good_frames = 50;           ///< in a row, before HOLD or VENT is left
   double max_latency_s = 0.05;    ///< later frames count as stale
   int frozen_frames = 100;  ///< identical poses in a row while the command changes; 0: not checked
-  int hold_overruns = 3;    ///< consecutive, judged only with SCHED_FIFO
+  int hold_overruns = 3;    ///< ticks missed in a row, judged only with SCHED_FIFO
   int vent_overruns = 10;   ///< the same
-  bool valve_readback = false;  ///< valves publish measured pressures; 100 ms of silence is a fault
+  bool valve_readback = false;   ///< valves publish measured pressures
+  double valve_silence_s = 0.1;  ///< without any: a fault
+  /// A measured pressure this far outside the range of what was commanded within
+  /// pressure_settling_s (to twice that) is a fault, a burst or a leak; 0: not checked.
+  double pressure_tolerance_bar = 0.2;
+  double pressure_settling_s = 0.3;
+  /// |K u + G(u) - A tau_A| of a segment that is larger for curvature_settling_s is a fault; 0: not
+  /// checked.
+  double curvature_residual_nm = 0.0;
+  double curvature_settling_s = 0.5;
+  double deadman_timeout_s = 0.2;  ///< without a "go", where there is a dead-man input
 };
 
 struct RealtimeSettings {
@@ -53,6 +63,7 @@ struct LcmSettings {
   std::string tick_channel = "SOFTARM_TICK";  ///< records for replay; empty: none
   std::string valves_channel = "SOFTARM_VALVES";
   std::string plant_channel = "SOFTARM_PLANT";  ///< a simulated arm's true state, for reports
+  std::string deadman_channel;                  ///< of a dead-man input; empty: there is none
   double command_validity_s = 0.1;              ///< after which the valve side vents by itself
 };
 

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 #include <softarm_messages/curvature_reference_t.hpp>
+#include <softarm_messages/deadman_t.hpp>
 #include <softarm_messages/mocap_frame_t.hpp>
 #include <softarm_messages/operator_command_t.hpp>
 #include <softarm_messages/pressure_measurement_t.hpp>
@@ -61,6 +62,7 @@ class DaemonLink {
   void take_reference(const ReceivedMessage& packet) noexcept;
   void take_operator(const ReceivedMessage& packet) noexcept;
   void take_measurement(const ReceivedMessage& packet) noexcept;
+  void take_go(const ReceivedMessage& packet) noexcept;
   std::int64_t arrival_ns(const ReceivedMessage& packet) const noexcept;
 
   DaemonSettings settings_;
@@ -80,6 +82,9 @@ class DaemonLink {
   std::int64_t wall_minus_monotonic_ns_ = 0;
   std::int64_t previous_collect_ns_ = 0;
   std::int64_t newest_measurement_ns_;
+  std::int64_t newest_go_ns_;
+  std::int64_t go_sequence_;
+  PressureVector measured_bar_;
   std::int64_t newest_reference_ns_ = 0;
   std::int64_t newest_operator_ns_ = 0;
   std::int64_t reference_sequence_;
@@ -92,6 +97,7 @@ class DaemonLink {
   softarm_messages::curvature_reference_t reference_message_;
   softarm_messages::operator_command_t operator_message_;
   softarm_messages::pressure_measurement_t measurement_message_;
+  softarm_messages::deadman_t deadman_message_;
   softarm_messages::timing_t timing_message_;
 };
 

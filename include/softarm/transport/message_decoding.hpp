@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <softarm_messages/controller_status_t.hpp>
 #include <softarm_messages/curvature_reference_t.hpp>
+#include <softarm_messages/deadman_t.hpp>
 #include <softarm_messages/mocap_frame_t.hpp>
 #include <softarm_messages/operator_command_t.hpp>
 #include <softarm_messages/plant_state_t.hpp>
@@ -37,5 +38,6 @@ bool decode(std::span<const std::byte> bytes, softarm_messages::plant_state_t& m
 bool decode(std::span<const std::byte> bytes, softarm_messages::timing_t& message) noexcept;
 bool decode(std::span<const std::byte> bytes, softarm_messages::tick_record_t& message) noexcept;
 bool decode(std::span<const std::byte> bytes, softarm_messages::valves_status_t& message) noexcept;
+bool decode(std::span<const std::byte> bytes, softarm_messages::deadman_t& message) noexcept;
 
 }  // namespace softarm

@@ -31,6 +31,7 @@ class RecordedInput {
   TickInput input_;
   std::vector<MocapFrame> frames_;
   LiveReferenceInput reference_;
+  PressureVector measured_bar_;
 };
 
 /// Encodes the records of consecutive ticks and keeps each to be sent once more kRepeatAfter ticks

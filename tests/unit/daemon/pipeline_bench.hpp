@@ -34,9 +34,12 @@ class PipelineBench {
     deliver();
     input.now_ns = now_ns;
     input.frames = {arrived.data(), count};
+    if (valves_publish) publish_pressures();
+    if (going) input.newest_go_ns = now_ns;
     const TickOutput& output = pipeline.tick(input);
-    input.arm = input.disarm = false;
+    input.arm = input.disarm = input.emergency_stop = false;
     input.reference = nullptr;
+    input.measured_bar = nullptr;
     return output;
   }
   const TickOutput& run(int ticks) {
@@ -79,6 +82,12 @@ class PipelineBench {
   bool moves = true;  ///< false: the arm stays where it is, whatever it is told
   std::int64_t frame_period_ns = 5 * kMs;
   std::int64_t latency_ns = 5 * kMs;
+  std::span<const MocapFrame> delivered() const { return {arrived.data(), count}; }
+
+  bool valves_publish = true;  ///< pressures, 10 ms behind the commands
+  bool going = true;           ///< somebody holds the dead-man switch
+  /// Spoils what the valves measured.
+  std::function<void(PressureVector&)> leak;
   /// Spoils a frame before it is sent; returns whether to send it.
   std::function<bool(MocapFrame&)> spoil;
 
@@ -104,6 +113,16 @@ class PipelineBench {
     frame.body[0].position_m.x() += frame.frame_number % 2 == 0 ? 1e-7 : -1e-7;
     if (publishing && (!spoil || spoil(frame))) send(frame, latency_ns);
   }
+  void publish_pressures() {
+    const PressureVector& commanded = pipeline.output().pressure_bar;
+    if (real_bar.size() == 0) real_bar = PressureVector::Zero(commanded.size());
+    const double part = 1.0 - std::exp(-1e-9 * static_cast<double>(pipeline.period_ns()) / 0.01);
+    real_bar += part * (commanded - real_bar);
+    measured_bar = real_bar;
+    if (leak) leak(measured_bar);
+    input.measured_bar = &measured_bar;
+    input.newest_measurement_ns = now_ns;
+  }
   void deliver() {
     count = 0;
     std::size_t kept = 0;
@@ -121,6 +140,7 @@ class PipelineBench {
   std::array<Flying, 64> flight;
   std::array<MocapFrame, 64> arrived;
   std::size_t in_flight = 0, count = 0;
+  PressureVector real_bar, measured_bar;
 };
 
 /// What must hold in every tick, whatever happens: finite pressures within their limits, and no

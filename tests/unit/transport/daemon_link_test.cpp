@@ -28,6 +28,8 @@ class DaemonLinkOverUdp : public ::testing::Test {
     settings.reference.phases = {{LiveReference{}, 0.0}};
     settings.daemon.bodies = {.base_id = 0, .segment_ids = {1, 2, 3}};
     settings.daemon.safety.valve_readback = true;
+    settings.daemon.safety.pressure_tolerance_bar = 100.0;  // the messages here follow nobody
+    settings.daemon.lcm.deadman_channel = "SOFTARM_GO";
     settings.daemon.lcm.url =
         "udpm://239.255.76.67:" + std::to_string(20000 + getpid() % 40000) + "?ttl=0";
   }
@@ -89,6 +91,7 @@ TEST_F(DaemonLinkOverUdp, TenThousandTicksAllocateNothing) {
   for (int k = 0; counted < kTicks; ++k) {
     sender->publish(lcm.mocap_channel, straight_frame(k));
     sender->publish(lcm.measurement_channel, measurement);
+    sender->publish(lcm.deadman_channel, deadman_t{.sequence = k, .go = 1});
     if (k % 10 == 0) {
       reference.sequence = k;
       sender->publish(lcm.reference_channel, reference);
@@ -163,6 +166,66 @@ TEST_F(DaemonLinkOverUdp, ADisarmIsObeyedWhateverItsNumber) {
   request(2000, operator_command_t::ARM);
   int armed = 0;
   ASSERT_TRUE(collect_until([&](const TickInput& input) { return (armed += input.arm) > 0; }));
+}
+
+TEST_F(DaemonLinkOverUdp, AnEmergencyStopIsObeyedWhateverItsNumberAndIsNoDisarm) {
+  const auto request = [this](std::int64_t sequence, std::int8_t what) {
+    sender->publish(settings.daemon.lcm.operator_channel,
+                    operator_command_t{.sequence = sequence, .request = what});
+  };
+  request(1000, operator_command_t::ARM);
+  ASSERT_TRUE(collect_until([](const TickInput& input) { return input.arm; }));
+  request(10, operator_command_t::EMERGENCY_STOP);
+  ASSERT_TRUE(collect_until([](const TickInput& input) {
+    EXPECT_FALSE(input.disarm) << "a disarm would acknowledge the stop";
+    return input.emergency_stop;
+  }));
+  request(11, 77);  // nobody knows what that is
+  ASSERT_TRUE(collect_until([](const TickInput& input) { return input.disarm; }));
+}
+
+TEST_F(DaemonLinkOverUdp, AGoIsHeardOnceANumberAndTakenBackAtOnce) {
+  const auto say = [this](std::int64_t sequence, bool go) {
+    sender->publish(settings.daemon.lcm.deadman_channel,
+                    deadman_t{.sequence = sequence, .go = static_cast<std::int8_t>(go)});
+  };
+  const auto heard = [](const TickInput& input) {
+    return input.newest_go_ns != SafetyInput::kNever;
+  };
+  say(1, true);
+  ASSERT_TRUE(collect_until(heard));
+  const std::int64_t first_ns = link->collect(monotonic_now_ns()).newest_go_ns;
+  say(1, true);  // a buffer that is sent again and again
+  EXPECT_FALSE(
+      collect_until([&](const TickInput& input) { return input.newest_go_ns != first_ns; }));
+  say(2, true);
+  ASSERT_TRUE(collect_until([&](const TickInput& input) { return input.newest_go_ns > first_ns; }));
+  say(3, false);
+  ASSERT_TRUE(collect_until([&](const TickInput& input) { return !heard(input); }));
+}
+
+TEST_F(DaemonLinkOverUdp, MeasuredPressuresArriveOnceAndOnlyIfTheyMakeSense) {
+  const auto send = [this](int chambers, float first) {
+    pressure_measurement_t message = test::example<pressure_measurement_t>(chambers / 4, 4);
+    message.pressure_bar[0] = first;
+    sender->publish(settings.daemon.lcm.measurement_channel, message);
+  };
+  send(12, 1.5F);
+  ASSERT_TRUE(collect_until([](const TickInput& input) {
+    if (input.measured_bar == nullptr) return false;
+    EXPECT_EQ(input.measured_bar->size(), 12);
+    EXPECT_EQ((*input.measured_bar)[0], 1.5);
+    EXPECT_EQ((*input.measured_bar)[11], 0.125 + 0.25 * 11);
+    return true;
+  }));
+  const std::int64_t heard_ns = link->collect(monotonic_now_ns()).newest_measurement_ns;
+  send(8, 1.0F);
+  send(12, std::numeric_limits<float>::quiet_NaN());
+  EXPECT_TRUE(collect_until([&](const TickInput& input) {
+    EXPECT_EQ(input.measured_bar, nullptr);
+    EXPECT_EQ(input.newest_measurement_ns, heard_ns);
+    return link->malformed() == 2;
+  }));
 }
 
 TEST_F(DaemonLinkOverUdp, AReferenceThatBeginsAnewIsHeardAfterASilence) {

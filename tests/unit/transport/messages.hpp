@@ -88,6 +88,11 @@ inline softarm_messages::operator_command_t example(int /*segments*/, int /*cham
 }
 
 template <>
+inline softarm_messages::deadman_t example(int /*segments*/, int /*chambers*/) {
+  return {.sequence = 100, .go = 1};
+}
+
+template <>
 inline softarm_messages::controller_status_t example(int segments, int chambers) {
   softarm_messages::controller_status_t message{};
   message.tick = 17;
@@ -165,6 +170,8 @@ inline softarm_messages::tick_record_t example(int segments, int chambers) {
   const auto frame = example<softarm_messages::mocap_frame_t>(segments, chambers);
   message.frames.push_back(
       {.frame_number = 5, .capture_ns = 6, .num_bodies = frame.num_bodies, .bodies = frame.bodies});
+  message.num_measured = message.num_chambers;
+  message.measured_bar = numbers<double>(message.num_chambers, 4000.0);
   message.build = "softarm 0.1.0 commit 0123456789-dirty";
   message.digest = -7;
   return message;

@@ -48,16 +48,25 @@ bool same_bits(const A& a, const B& b, std::size_t count) {
 
 void expect_same(const TickInput& a, const TickInput& b) {
   // A new field of TickInput stops the build here too: it belongs into this test.
-  const auto& [now_a, frames_a, reference_a, arm_a, disarm_a, shutdown_a, overruns_a,
-               measurement_a] = a;
-  const auto& [now_b, frames_b, reference_b, arm_b, disarm_b, shutdown_b, overruns_b,
-               measurement_b] = b;
+  const auto& [now_a, frames_a, reference_a, arm_a, disarm_a, stop_a, shutdown_a, overruns_a,
+               measurement_a, measured_a, go_a] = a;
+  const auto& [now_b, frames_b, reference_b, arm_b, disarm_b, stop_b, shutdown_b, overruns_b,
+               measurement_b, measured_b, go_b] = b;
   EXPECT_EQ(now_a, now_b);
   EXPECT_EQ(arm_a, arm_b);
   EXPECT_EQ(disarm_a, disarm_b);
   EXPECT_EQ(shutdown_a, shutdown_b);
   EXPECT_EQ(overruns_a, overruns_b);
   EXPECT_EQ(measurement_a, measurement_b);
+  EXPECT_EQ(stop_a, stop_b);
+  EXPECT_EQ(go_a, go_b);
+  ASSERT_EQ(measured_a == nullptr, measured_b == nullptr);
+  if (measured_a != nullptr) {
+    ASSERT_EQ(measured_a->size(), measured_b->size());
+    EXPECT_EQ(std::memcmp(measured_a->data(), measured_b->data(),
+                          sizeof(double) * static_cast<std::size_t>(measured_a->size())),
+              0);
+  }
   ASSERT_EQ(reference_a == nullptr, reference_b == nullptr);
   if (reference_a != nullptr) {
     const auto& [u_a, velocity_a, acceleration_a] = *reference_a;
@@ -115,6 +124,10 @@ TEST(TickRecord, AnyInputComesBackBitForBit) {
       input.shutdown = k % 7 == 0;
       input.consecutive_overruns = static_cast<int>(any.random());
       input.newest_measurement_ns = any.integer();
+      input.newest_go_ns = any.integer();
+      input.emergency_stop = k % 11 == 0;
+      const PressureVector measured = PressureVector::Random(4 * segments);
+      if (k % 4 == 0) input.measured_bar = &measured;
       const PressureVector command = PressureVector::Random(4 * segments);
 
       const auto bytes = recorder.record(k, input, command);
