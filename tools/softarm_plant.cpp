@@ -186,9 +186,12 @@ class PlantProcess {
   softarm_messages::plant_state_t state_message_;
 };
 
-int serve(const std::string& path, std::optional<int> modbus_port) {
-  const Experiment experiment = load_experiment(path);
-  const LcmSettings& lcm = experiment.daemon.lcm;
+int serve(const std::string& path, const std::string& sensor_suffix,
+          std::optional<int> modbus_port) {
+  Experiment experiment = load_experiment(path);
+  LcmSettings& lcm = experiment.daemon.lcm;
+  lcm.mocap_channel += sensor_suffix;
+  lcm.measurement_channel += sensor_suffix;
   const bool by_torque = experiment.actuation.kind == ActuationKind::torque;
   if (by_torque && modbus_port)
     throw ConfigError(path, 0, "actuation.kind",
@@ -214,7 +217,7 @@ int serve(const std::string& path, std::optional<int> modbus_port) {
 int main(int argc, char** argv) {
   CLI::App app("The simulated arm in real time: valve pressures in, motion-capture frames out",
                "softarm-plant");
-  std::string config;
+  std::string config, sensor_suffix;
   std::optional<int> modbus_port;
   app.add_option("CONFIG", config, "experiment in YAML")->required();
   app.add_option("--modbus", modbus_port,
@@ -222,5 +225,9 @@ int main(int argc, char** argv) {
                  "commands from LCM")
       ->check(CLI::Range(0, 65535))
       ->type_name("PORT");
-  return softarm::run_program(argc, argv, app, [&] { return softarm::serve(config, modbus_port); });
+  app.add_option("--sensor-suffix", sensor_suffix,
+                 "of the channels for motion capture and measured pressures: with _CLEAN, "
+                 "softarm-fault stands between them and softarmd");
+  return softarm::run_program(argc, argv, app,
+                              [&] { return softarm::serve(config, sensor_suffix, modbus_port); });
 }

@@ -1,7 +1,7 @@
 # softarm_room(NAME sources... [DEPENDS rooms/libraries] [PRIVATE_DEPENDS libraries]): one library a room of the house, so
 # that the linker enforces which way the arrows point. softarm_program(NAME sources... DEPENDS ...): one executable.
-# softarm_tests(LABEL ROOM [ALONE] DEPENDS ...): one test program from every *_test.cpp in the folder ROOM; ALONE for tests
-# in real time, which nothing may run beside.
+# softarm_tests(LABEL ROOM [ALONE] [SLOW FILTER] DEPENDS ...): one test program from every *_test.cpp in the folder ROOM;
+# ALONE for tests in real time, which nothing may run beside; those whose names FILTER fits get the label slow instead.
 
 add_library(softarm_options INTERFACE)
 target_compile_features(softarm_options INTERFACE cxx_std_20)
@@ -44,7 +44,7 @@ function(softarm_program name)
 endfunction()
 
 function(softarm_tests label room)
-  cmake_parse_arguments(TESTS "ALONE" "" "DEPENDS" ${ARGN})
+  cmake_parse_arguments(TESTS "ALONE" "SLOW" "DEPENDS" ${ARGN})
   file(GLOB sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/${room}/*_test.cpp)
   if(NOT sources)
     return()
@@ -55,6 +55,13 @@ function(softarm_tests label room)
   target_link_libraries(${target} PRIVATE ${TESTS_DEPENDS} GTest::gtest_main softarm_options)
   target_compile_definitions(${target} PRIVATE
     SOFTARM_SOURCE_DIR="${PROJECT_SOURCE_DIR}" SOFTARM_BINARY_DIR="${PROJECT_BINARY_DIR}")
+  set(usual "*")
+  if(TESTS_SLOW)
+    set(usual "-${TESTS_SLOW}")
+    gtest_discover_tests(${target} TEST_PREFIX "${label}.${room}." PROPERTIES LABELS slow TIMEOUT 300
+      RUN_SERIAL ${TESTS_ALONE} TEST_FILTER ${TESTS_SLOW} TEST_LIST ${target}_slow
+      DISCOVERY_TIMEOUT 60 NO_PRETTY_TYPES NO_PRETTY_VALUES)
+  endif()
   gtest_discover_tests(${target} TEST_PREFIX "${label}.${room}." PROPERTIES LABELS ${label} TIMEOUT 300
-    RUN_SERIAL ${TESTS_ALONE} DISCOVERY_TIMEOUT 60 NO_PRETTY_TYPES NO_PRETTY_VALUES)
+    RUN_SERIAL ${TESTS_ALONE} TEST_FILTER ${usual} DISCOVERY_TIMEOUT 60 NO_PRETTY_TYPES NO_PRETTY_VALUES)
 endfunction()

@@ -1,0 +1,176 @@
+// softarm-fault: makes the faults that the daemon must survive, by hand.
+#include <fmt/format.h>
+#include <signal.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <memory>
+
+#include "fault/fault_relay.hpp"
+#include "fault/raw_packets.hpp"
+#include "program.hpp"
+#include "signals.hpp"
+#include "softarm/config/load.hpp"
+#include "softarm/daemon/realtime.hpp"
+
+namespace softarm {
+namespace {
+
+struct Options {
+  std::string config, fault;
+  std::string suffix = kSensorSuffix;
+  double amount = 0.0, after_s = 2.0, for_s = 2.0;
+  int body = 1, pid = 0;
+  bool has_amount = false, list = false;
+};
+
+/// Faults that are no change of a message.
+struct OtherFault {
+  const char *name, *what, *reaction;
+};
+constexpr OtherFault kOthers[] = {
+    {"none", "everything goes through", "ACTIVE"},
+    {"hostile", "bytes that are no message, on every channel of the daemon",
+     "refused, counted, told once a second; ACTIVE"},
+    {"flood", "frames that repeat, as fast as they can be sent",
+     "bounded work a tick; where real frames are lost HOLD or VENT, then ACTIVE"},
+    {"pause", "SIGSTOP for --for seconds, then SIGCONT, to process --pid",
+     "beyond vent_after_s: VENT (time_gap); shorter: missed ticks"},
+};
+
+void print_list() {
+  fmt::print("{:<11} {:<68} {:<46} {}\n", "FAULT", "what happens", "--amount", "reaction");
+  for (const FaultDescription& each : fault_list()) {
+    const std::string amount =
+        each.amount[0] == '\0' ? "" : fmt::format("{} [{:g}]", each.amount, each.usual);
+    fmt::print("{:<11} {:<68} {:<46} {}\n", each.name, each.what, amount, each.reaction);
+  }
+  for (const OtherFault& each : kOthers)
+    fmt::print("{:<11} {:<68} {:<46} {}\n", each.name, each.what, "", each.reaction);
+}
+
+void wait_s(double time_s) {
+  const std::int64_t end_ns = monotonic_now_ns() + static_cast<std::int64_t>(1e9 * time_s);
+  while (stop_requested == 0 && monotonic_now_ns() < end_ns)
+    sleep_until_ns(std::min(end_ns, monotonic_now_ns() + 50'000'000));
+}
+
+/// Sends packets for a while: one after the other with a pause, or, without one, as fast as it
+/// goes.
+void send_packets(const std::string& url, const std::vector<Packet>& packets, double for_s,
+                  std::int64_t pause_ns) {
+  RawSender sender(url);
+  const std::int64_t end_ns = monotonic_now_ns() + static_cast<std::int64_t>(1e9 * for_s);
+  std::int64_t sent = 0;
+  while (stop_requested == 0 && monotonic_now_ns() < end_ns) {
+    sent += sender.send(packets[static_cast<std::size_t>(sent) % packets.size()]) ? 1 : 0;
+    if (pause_ns > 0) sleep_until_ns(monotonic_now_ns() + pause_ns);
+  }
+  say(fmt::format("softarm-fault: {} packets sent\n", sent));
+}
+
+int pause_process(const Options& options) {
+  const auto send = [&](int number) {
+    if (options.pid > 1 && kill(options.pid, number) == 0) return true;
+    print_error("softarm-fault",
+                options.pid > 1 ? fmt::format("process {}: {}", options.pid, std::strerror(errno))
+                                : "pause needs --pid PID: pidof softarmd tells it");
+    return false;
+  };
+  if (!send(SIGSTOP)) return kExitFailure;
+  wait_s(options.for_s);
+  return send(SIGCONT) ? kExitOk : kExitFailure;
+}
+
+Packet flooding_frame(const LcmSettings& lcm) {
+  softarm_messages::mocap_frame_t frame{};
+  Packet bytes(static_cast<std::size_t>(frame.getEncodedSize()));
+  frame.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
+  return lcm_packet(lcm.mocap_channel, bytes);
+}
+
+int make(const Options& options) {
+  const Experiment experiment = load_experiment(options.config);
+  const LcmSettings& lcm = experiment.daemon.lcm;
+  catch_stop_signals();
+  if (options.fault == "pause") return pause_process(options);
+  if (options.fault == "hostile") {
+    send_packets(lcm.url, hostile_packets(lcm), options.for_s, 1'000'000);
+    return kExitOk;
+  }
+  if (options.fault == "flood") {
+    send_packets(lcm.url, {flooding_frame(lcm)}, options.for_s, 0);
+    return kExitOk;
+  }
+  Fault fault = options.fault == "none" ? Fault{} : *find_fault(options.fault);
+  fault.body = options.body;
+  if (options.has_amount) fault.amount = options.amount;
+
+  FaultRelay relay(lcm, options.suffix);
+  say(fmt::format("softarm-fault: {}{} -> {}; {} in {:g} s for {:g} s\n", lcm.mocap_channel,
+                  options.suffix, lcm.mocap_channel, options.fault, options.after_s,
+                  options.for_s));
+  wait_s(options.after_s);
+  if (relay.frames_received() == 0)
+    say(
+        fmt::format("softarm-fault: warning: no frames on {0}{1}; start softarm-plant {2} "
+                    "--sensor-suffix {1}\n",
+                    lcm.mocap_channel, options.suffix, options.config));
+  relay.set(fault);
+  say(fmt::format("softarm-fault: {} begins\n", options.fault));
+  wait_s(options.for_s);
+  relay.set({});
+  say("softarm-fault: it ends; everything goes through until Ctrl-C\n");
+  while (stop_requested == 0) wait_s(1.0);
+  return kExitOk;
+}
+
+/// Accepts the name of a fault.
+CLI::Validator known_fault() {
+  return {
+      [](std::string& name) -> std::string {
+        const bool other = std::any_of(std::begin(kOthers), std::end(kOthers),
+                                       [&](const OtherFault& each) { return each.name == name; });
+        return other || find_fault(name) ? std::string()
+                                         : fmt::format("unknown fault {}; --list names them", name);
+      },
+      "FAULT"};
+}
+
+}  // namespace
+}  // namespace softarm
+
+int main(int argc, char** argv) {
+  CLI::App app(
+      "Makes the faults a daemon must survive. Those of frames and pressures happen on the way: "
+      "start softarm-plant CONFIG --sensor-suffix _CLEAN, softarmd CONFIG and this",
+      "softarm-fault");
+  softarm::Options options;
+  auto* list =
+      app.add_flag("--list", options.list, "print the faults with what should happen, and end");
+  app.add_option("CONFIG", options.config, "experiment in YAML");
+  app.add_option("FAULT", options.fault, "which one")->check(softarm::known_fault());
+  auto* amount = app.add_option("--amount", options.amount, "how much; --list tells the unit")
+                     ->check(CLI::Number);
+  app.add_option("--body", options.body, "which body, or chamber, in the order of the message")
+      ->check(CLI::NonNegativeNumber);
+  app.add_option("--after", options.after_s, "seconds until the fault begins")
+      ->check(CLI::NonNegativeNumber);
+  app.add_option("--for", options.for_s, "seconds until it ends")
+      ->check(softarm::positive_seconds());
+  app.add_option("--sensor-suffix", options.suffix, "of the channels the sensors publish on");
+  app.add_option("--pid", options.pid, "of the process to pause")->check(CLI::PositiveNumber);
+  return softarm::run_program(argc, argv, app, [&]() -> int {
+    options.has_amount = amount->count() > 0;
+    if (list->count() > 0) {
+      softarm::print_list();
+      return softarm::kExitOk;
+    }
+    if (options.config.empty() || options.fault.empty()) {
+      softarm::print_error("softarm-fault", "CONFIG and FAULT are required; see --help and --list");
+      return softarm::kExitUsage;
+    }
+    return softarm::make(options);
+  });
+}
