@@ -120,7 +120,8 @@ bool decode(std::span<const std::byte> bytes, softarm_messages::tick_record_t& m
   const int frames = bounded(length16_at(bytes, kCounts + 4), TickRecorder::kMostFrames);
   const int measured = bounded(length16_at(bytes, kCounts + 6), kMaxChambers);
   if (chambers < 0 || dimension < 0 || frames < 0 || measured < 0) return false;
-  std::size_t at = kCounts + 8 + 8 * static_cast<std::size_t>(chambers + measured + 3 * dimension);
+  std::size_t at = kCounts + 8 + 4 * static_cast<std::size_t>(measured) +
+                   8 * static_cast<std::size_t>(chambers + 3 * dimension);
   for (int k = 0; k < frames; ++k) {
     const int bodies = bounded(length16_at(bytes, at + 2 * 8), kMaxBodies);
     if (bodies < 1) return false;

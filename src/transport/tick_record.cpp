@@ -133,8 +133,11 @@ void to_record(const TickInput& input, tick_record_t& record) {
   record.num_measured = 0;
   if (measured_bar != nullptr) {
     record.num_measured = static_cast<std::int16_t>(measured_bar->size());
-    grow_to(record.measured_bar, static_cast<std::size_t>(measured_bar->size()));
-    std::copy(measured_bar->begin(), measured_bar->end(), record.measured_bar.begin());
+    // Valves publish floats, so nothing is lost here.
+    if (record.measured_bar.size() < static_cast<std::size_t>(measured_bar->size()))
+      record.measured_bar.resize(static_cast<std::size_t>(measured_bar->size()));
+    std::transform(measured_bar->begin(), measured_bar->end(), record.measured_bar.begin(),
+                   [](double bar) { return static_cast<float>(bar); });
   }
 }
 
@@ -159,7 +162,8 @@ const TickInput& RecordedInput::from(const tick_record_t& record) {
   input_.newest_go_ns = record.newest_go_ns;
   if (record.num_measured > 0) {
     measured_bar_ =
-        Eigen::Map<const Eigen::VectorXd>(record.measured_bar.data(), record.num_measured);
+        Eigen::Map<const Eigen::VectorXf>(record.measured_bar.data(), record.num_measured)
+            .cast<double>();
     input_.measured_bar = &measured_bar_;
   }
   return input_;

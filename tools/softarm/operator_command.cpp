@@ -2,6 +2,8 @@
 #include <fmt/format.h>
 
 #include <chrono>
+#include <cstdio>
+#include <functional>
 #include <memory>
 #include <softarm_messages/controller_status_t.hpp>
 #include <softarm_messages/deadman_t.hpp>

@@ -171,7 +171,7 @@ inline softarm_messages::tick_record_t example(int segments, int chambers) {
   message.frames.push_back(
       {.frame_number = 5, .capture_ns = 6, .num_bodies = frame.num_bodies, .bodies = frame.bodies});
   message.num_measured = message.num_chambers;
-  message.measured_bar = numbers<double>(message.num_chambers, 4000.0);
+  message.measured_bar = numbers<float>(message.num_chambers, 4000.0);
   message.build = "softarm 0.1.0 commit 0123456789-dirty";
   message.digest = -7;
   return message;

@@ -126,7 +126,8 @@ TEST(TickRecord, AnyInputComesBackBitForBit) {
       input.newest_measurement_ns = any.integer();
       input.newest_go_ns = any.integer();
       input.emergency_stop = k % 11 == 0;
-      const PressureVector measured = PressureVector::Random(4 * segments);
+      const PressureVector measured =
+          PressureVector::Random(4 * segments).cast<float>().cast<double>();
       if (k % 4 == 0) input.measured_bar = &measured;
       const PressureVector command = PressureVector::Random(4 * segments);
 
