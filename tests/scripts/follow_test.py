@@ -1,0 +1,91 @@
+"""docs/examples/follow.py moves the simulated arm in a circle. Argument: folder of the programs.
+
+Runs in the Python of tools/python_environment, which has the package lcm; skipped where that was not made.
+"""
+import importlib.util
+import math
+import os
+import pathlib
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+EXAMPLE = ROOT / "docs/examples/follow.py"
+PYTHON = ROOT / "build/python/bin/python"
+
+if not PYTHON.exists():
+    print("skipped: tools/python_environment was not run (it fetches the Python package lcm)")
+    sys.exit(77)
+if subprocess.run([ROOT / "tools/with_loopback_network", "--check"], capture_output=True, check=False).returncode != 0:
+    print("skipped: no multicast route here (tools/with_loopback_network)")
+    sys.exit(77)
+if pathlib.Path(sys.prefix) != PYTHON.parents[1]:
+    subprocess.run([ROOT / "tools/python_environment"], check=True, capture_output=True)  # the types as they are now
+    os.execv(PYTHON, [PYTHON, "-B", *sys.argv])
+
+import lcm  # noqa: E402
+from softarm_messages import plant_state_t  # noqa: E402
+
+PROGRAMS = pathlib.Path(sys.argv.pop(1))
+BEND_RAD = 0.3
+
+
+class Follow(unittest.TestCase):
+    def start(self, folder, *command):
+        output = open(folder / f"{pathlib.Path(command[0]).name}.txt", "w", encoding="utf-8")
+        self.addCleanup(output.close)
+        process = subprocess.Popen(command, stdout=output, stderr=output)
+
+        def end():
+            process.send_signal(signal.SIGTERM)
+            process.wait()
+
+        self.addCleanup(end)
+        return process
+
+    def test_the_arm_really_goes_round(self):
+        temporary = tempfile.TemporaryDirectory()
+        self.addCleanup(temporary.cleanup)
+        folder = pathlib.Path(temporary.name)
+        url = f"udpm://239.255.76.67:{20000 + os.getpid() % 40000}?ttl=0"
+        config = folder / "config.yaml"
+        config.write_text(f"include: {ROOT}/config/one_segment_live.yaml\nname: followed\n"
+                          f"daemon: {{lcm: {{url: \"{url}\"}}}}\n", encoding="utf-8")
+        bends = []
+        node = lcm.LCM(url)
+
+        def take_plant(_channel, data):
+            bends.append(plant_state_t.decode(data).u_rad[0])
+
+        node.subscribe("SOFTARM_PLANT", take_plant)
+        self.start(folder, PROGRAMS / "softarm-plant", config)
+        self.start(folder, PROGRAMS / "softarmd", config)
+        example = self.start(folder, PYTHON, "-B", EXAMPLE, "--url", url, "--duration", "6", "--rate", "2",
+                             "--bend", str(BEND_RAD))
+        end = time.monotonic() + 60
+        while example.poll() is None and time.monotonic() < end:
+            node.handle_timeout(100)
+        self.assertEqual(example.poll(), 0, (folder / "python.txt").read_text(encoding="utf-8"))
+        bent = [u for u in bends if abs(math.hypot(*u) - BEND_RAD) < 0.1 * BEND_RAD]
+        self.assertEqual({(x > 0, y > 0) for x, y in bent}, {(a, b) for a in (False, True) for b in (False, True)})
+        self.assertLess(max(math.hypot(*u) for u in bends), 1.1 * BEND_RAD)
+
+    def test_the_derivatives_it_sends_are_those_of_what_it_sends(self):
+        spec = importlib.util.spec_from_file_location("follow", EXAMPLE)
+        follow = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(follow)
+        h = 1e-4
+        for t in (0.3, 1.1, 4.9, 8.3, 9.6):
+            before, here, after = (follow.circle(t + d, 10.0, 0.4, 1.7) for d in (-h, 0.0, h))
+            for axis in (0, 1):
+                for derivative in (0, 1):
+                    slope = (after[derivative][axis] - before[derivative][axis]) / (2 * h)
+                    self.assertAlmostEqual(here[derivative + 1][axis], slope, delta=1e-6)
+
+
+if __name__ == "__main__":
+    unittest.main()
