@@ -1,0 +1,155 @@
+// Faults of the frames, made by the injector between the plant and a running softarmd.
+#include "faults/softarmd/fault_test.hpp"
+
+namespace softarm {
+namespace {
+
+using test::FaultTest;
+using test::Process;
+
+class FrameFaults : public FaultTest {
+ protected:
+  void SetUp() override {
+    FaultTest::SetUp();
+    if (IsSkipped()) return;
+    configure(*this);
+    relay_ = start_relay(*this);
+    plant_process_ = start_plant(*this, kSensorSuffix);
+    daemon_ = start("softarmd");
+    ASSERT_TRUE(wait_for([&] { return under_pressure(); }))
+        << daemon_->printed() << plant_process_->printed();
+  }
+
+  void inject(const std::string& name, double amount = 0.0, int body = 2) {
+    Fault fault = *find_fault(name);
+    if (amount != 0.0) fault.amount = amount;
+    fault.body = body;
+    forget();
+    relay_->set(fault);
+  }
+  /// All is well again, and the daemon ACTIVE.
+  void recovers() {
+    relay_->set({});
+    EXPECT_TRUE(stays_active(*this, 10)) << told() << daemon_->printed();
+  }
+
+  std::unique_ptr<FaultRelay> relay_;
+  std::unique_ptr<Process> plant_process_, daemon_;
+};
+
+// Frames that stay away, for whatever reason: the pressures are frozen, then vented.
+TEST_P(FrameFaults, WithoutGoodFramesTheDaemonHoldsThenVents) {
+  struct Row {
+    const char* fault;
+    double amount;
+    bool rejected;  ///< the frames came and are counted as refused
+  };
+  for (const Row& row :
+       {Row{"stop", 0.0, false}, Row{"occlude", 0.0, false}, Row{"nan", 0.0, true},
+        Row{"inf", 0.0, true}, Row{"quaternion", 0.0, true}, Row{"length", 0.0, true},
+        Row{"swap", 0.0, true}, Row{"delay", 0.3, true}}) {
+    SCOPED_TRACE(row.fault);
+    const int rejected = status_.frames_rejected;
+    inject(row.fault, row.amount);
+    EXPECT_TRUE(becomes(*this, Mode::vent, Reason::frames_stale)) << told() << daemon_->printed();
+    EXPECT_TRUE(saw(Mode::hold, Reason::frames_late)) << told();
+    EXPECT_TRUE(wait_for([&] { return largest(command_.pressure_bar) == 0.0F; })) << told();
+    if (row.rejected) {
+      EXPECT_TRUE(wait_for([&] { return status_.frames_rejected > rejected + 5; }));
+    } else {
+      EXPECT_EQ(status_.frames_rejected, rejected);
+    }
+    recovers();
+  }
+  expect_limits(*this);
+}
+
+TEST_P(FrameFaults, WhatIsDroppedOrCompensatedDisturbsNothing) {
+  struct Row {
+    const char* fault;
+    double amount;
+    int softarm_messages::controller_status_t::*counter;
+  };
+  using Status = softarm_messages::controller_status_t;
+  for (const Row& row : {Row{"duplicate", 0.0, &Status::frames_repeated},
+                         Row{"reorder", 0.0, &Status::frames_rejected},
+                         Row{"jump", 0.0, &Status::frames_rejected}}) {
+    SCOPED_TRACE(row.fault);
+    const int before = status_.*row.counter;
+    // Every other frame is refused, so a HOLD for another reason (a busy machine) would not end.
+    bool undisturbed = false;
+    for (int k = 0; k < 5 && !undisturbed; ++k) {
+      inject(row.fault, row.amount);
+      EXPECT_TRUE(wait_for([&] { return status_.*row.counter > before + 10; })) << told();
+      active_in_row_ = 0;
+      undisturbed = wait_for([&] { return active_in_row_ >= 100; }, 1.0);
+      recovers();
+    }
+    EXPECT_TRUE(undisturbed) << told() << daemon_->printed();
+  }
+
+  // Late frames, within the bound: the age is known, u is predicted over it.
+  const float age_s = status_.frame_age_s;
+  inject("delay", 0.03);
+  EXPECT_TRUE(wait_for([&] { return status_.frame_age_s > age_s + 0.02F; })) << told();
+  EXPECT_TRUE(stays_active(*this)) << told() << daemon_->printed();
+  recovers();
+
+  // The sender's clock is set forward, and with the end of the fault back.
+  inject("clock", 3600.0);
+  const int accepted = status_.frames_accepted;
+  EXPECT_TRUE(stays_active(*this)) << told() << daemon_->printed();
+  EXPECT_TRUE(wait_for([&] { return status_.frames_accepted > accepted + 40; }));
+  recovers();
+  EXPECT_TRUE(stays_active(*this)) << told() << daemon_->printed();
+  expect_limits(*this);
+}
+
+TEST_P(FrameFaults, FrozenPosesHoldAndARestartedSenderVents) {
+  inject("freeze");
+  EXPECT_TRUE(becomes(*this, Mode::hold, Reason::poses_frozen)) << told() << daemon_->printed();
+  const std::vector<float> held = command_.pressure_bar;
+  const int commands = commands_;
+  ASSERT_TRUE(wait_for([&] { return commands_ > commands + 50; }));
+  EXPECT_EQ(command_.pressure_bar, held);
+  EXPECT_EQ(mode(), Mode::hold) << told();
+  recovers();
+
+  inject("restart");
+  EXPECT_TRUE(wait_for([&] { return saw(Mode::vent, Reason::sender_restarted); })) << told();
+  recovers();
+
+  // The same by a real restart, after a silence.
+  forget();
+  plant_process_.reset();
+  EXPECT_TRUE(becomes(*this, Mode::vent, Reason::frames_stale)) << told();
+  plant_process_ = start_plant(*this, kSensorSuffix);
+  recovers();
+  expect_limits(*this);
+}
+
+TEST_P(FrameFaults, WithExplicitArmingARestartedSenderMustBeArmedAnew) {
+  daemon_->signal(SIGTERM);
+  ASSERT_EQ(daemon_->wait(std::chrono::seconds(5)), 0);
+  configure(*this, ", arming: explicit");
+  statuses_ = 0;
+  daemon_ = start("softarmd");
+  const auto arm = [&](std::int64_t number) {
+    node_->publish("SOFTARM_OPERATOR",
+                   softarm_messages::operator_command_t{.sequence = number, .request = 1});
+  };
+  ASSERT_TRUE(becomes(*this, Mode::wait_frames, Reason::waiting_for_arm)) << daemon_->printed();
+  arm(1);
+  ASSERT_TRUE(wait_for([&] { return under_pressure(); })) << told();
+  inject("restart");
+  EXPECT_TRUE(becomes(*this, Mode::vent, Reason::waiting_for_arm)) << told();
+  EXPECT_TRUE(saw(Mode::vent, Reason::sender_restarted)) << told();
+  EXPECT_EQ(largest(command_.pressure_bar), 0.0F);
+  arm(2);
+  EXPECT_TRUE(wait_for([&] { return mode() == Mode::active; })) << told();
+}
+
+SOFTARM_ON_BOTH_MACHINES(FrameFaults);
+
+}  // namespace
+}  // namespace softarm

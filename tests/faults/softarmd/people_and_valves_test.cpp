@@ -1,0 +1,124 @@
+// What people ask of a running softarmd, and what the valves' read-back tells it.
+#include <chrono>
+
+#include "faults/softarmd/fault_test.hpp"
+
+namespace softarm {
+namespace {
+
+using namespace std::chrono_literals;
+using softarm_messages::operator_command_t;
+using test::FaultTest;
+using test::Process;
+
+class PeopleAndValves : public FaultTest {
+ protected:
+  /// `softarm COMMAND`: its exit code.
+  int ask(const char* command, std::string* printed = nullptr) {
+    const auto process = start("softarm", {command});
+    const int code = process->wait(10s);
+    if (printed != nullptr) *printed = process->printed();
+    return code;
+  }
+  void request(std::int8_t what) {
+    node_->publish("SOFTARM_OPERATOR", operator_command_t{.sequence = ++number_, .request = what});
+  }
+  bool vented() {
+    return wait_for([&] { return mode() >= Mode::vent && largest(command_.pressure_bar) == 0.0F; });
+  }
+  std::int64_t number_ = 0;
+};
+
+TEST_P(PeopleAndValves, ArmDisarmEmergencyStopAndDeadMan) {
+  lcm_ = ", deadman_channel: GO";
+  configure(*this, ", arming: explicit");
+  const auto plant = start_plant(*this);
+  const auto daemon = start("softarmd");
+  ASSERT_TRUE(becomes(*this, Mode::wait_frames, Reason::deadman_released)) << daemon->printed();
+  auto deadman = start("softarm", {"deadman"});
+  ASSERT_TRUE(becomes(*this, Mode::wait_frames, Reason::waiting_for_arm)) << daemon->printed();
+  EXPECT_FALSE(wait_for([&] { return mode() == Mode::active; }, 0.2));
+  EXPECT_EQ(ask("arm"), 0);
+  ASSERT_TRUE(wait_for([&] { return under_pressure(); })) << daemon->printed();
+
+  EXPECT_EQ(ask("disarm"), 0);
+  EXPECT_TRUE(vented()) << told();
+  ASSERT_TRUE(becomes(*this, Mode::vent, Reason::waiting_for_arm)) << told();
+  EXPECT_EQ(ask("arm"), 0);
+  ASSERT_TRUE(wait_for([&] { return under_pressure(); })) << daemon->printed();
+
+  // An emergency stop is latched: arming alone is refused, and the cure told.
+  EXPECT_EQ(ask("estop"), 0);
+  EXPECT_TRUE(becomes(*this, Mode::fault, Reason::emergency_stop)) << told();
+  EXPECT_TRUE(vented()) << told();
+  std::string printed;
+  EXPECT_EQ(ask("arm", &printed), 1);
+  EXPECT_NE(printed.find("FAULT (emergency_stop); disarm first"), std::string::npos) << printed;
+  EXPECT_EQ(mode(), Mode::fault) << told();
+  EXPECT_EQ(ask("disarm"), 0);
+  ASSERT_TRUE(becomes(*this, Mode::vent, Reason::waiting_for_arm)) << told();
+  EXPECT_EQ(ask("arm"), 0);
+  ASSERT_TRUE(wait_for([&] { return under_pressure(); })) << daemon->printed();
+
+  // The dead-man input falls silent, and speaks again: that alone moves nothing.
+  deadman->signal(SIGSTOP);
+  EXPECT_TRUE(becomes(*this, Mode::vent, Reason::deadman_released)) << told();
+  EXPECT_TRUE(vented()) << told();
+  deadman->signal(SIGCONT);
+  ASSERT_TRUE(becomes(*this, Mode::vent, Reason::waiting_for_arm)) << told();
+  EXPECT_EQ(ask("arm"), 0);
+  ASSERT_TRUE(wait_for([&] { return under_pressure(); })) << daemon->printed();
+  deadman->signal(SIGINT);  // it says that it lets go
+  EXPECT_TRUE(becomes(*this, Mode::vent, Reason::deadman_released)) << told();
+  EXPECT_EQ(deadman->wait(5s), 0) << deadman->printed();
+  expect_limits(*this);
+  for (const char* line : {"FAULT (emergency_stop)", "VENT (deadman_released)", "VENT (disarmed)"})
+    EXPECT_TRUE(daemon->printed().find(line) != std::string::npos) << line << daemon->printed();
+}
+
+TEST_P(PeopleAndValves, SilentOrLeakingValvesAreALatchedFault) {
+  configure(*this, ", valve_readback: true");
+  const auto relay = start_relay(*this);
+  relay->set(*find_fault("silence"));
+  const auto plant = start_plant(*this, kSensorSuffix);
+  const auto daemon = start("softarmd");
+  // Nothing is pressurised yet: no fault, but no control either.
+  ASSERT_TRUE(wait_for([&] { return status_.frames_accepted > 60; })) << daemon->printed();
+  EXPECT_EQ(mode(), Mode::wait_frames) << told();
+  EXPECT_EQ(reason(), Reason::valves_silent) << told();
+  relay->set({});
+  ASSERT_TRUE(wait_for([&] { return under_pressure(); })) << daemon->printed();
+
+  struct Row {
+    const char* fault;
+    Reason reason;
+  };
+  for (const Row& row :
+       {Row{"silence", Reason::valves_silent}, Row{"burst", Reason::pressure_mismatch}}) {
+    SCOPED_TRACE(row.fault);
+    // A burst shows where there should be pressure: in the fullest chamber.
+    ASSERT_TRUE(wait_for([&] {
+      return mode() == Mode::active && largest(command_.pressure_bar) > 0.5F;
+    })) << told();
+    Fault fault = *find_fault(row.fault);
+    const auto& bar = command_.pressure_bar;
+    fault.body = static_cast<int>(std::max_element(bar.begin(), bar.end()) - bar.begin());
+    relay->set(fault);
+    EXPECT_TRUE(becomes(*this, Mode::fault, row.reason)) << told() << daemon->printed();
+    EXPECT_TRUE(vented()) << told();
+    relay->set({});
+    const int accepted = status_.frames_accepted;
+    ASSERT_TRUE(wait_for([&] { return status_.frames_accepted > accepted + 40; }));
+    EXPECT_EQ(mode(), Mode::fault) << "it is latched";
+    request(operator_command_t::DISARM);
+    ASSERT_TRUE(becomes(*this, Mode::vent, Reason::waiting_for_arm)) << told();
+    request(operator_command_t::ARM);
+    ASSERT_TRUE(wait_for([&] { return under_pressure(); })) << told();
+  }
+  expect_limits(*this);
+}
+
+SOFTARM_ON_BOTH_MACHINES(PeopleAndValves);
+
+}  // namespace
+}  // namespace softarm
