@@ -50,6 +50,34 @@ void describe_run(SchemaVisitor& visitor, RunSettings& run) {
                  run.log_rate_hz);
 }
 
+void describe_identification(SchemaVisitor& visitor, IdentificationSettings& identification,
+                             int segments) {
+  visitor.numbers(
+      {"steps_bar", "bar", "pressures of the steps, on every side in turn", above_to(0.0, 100.0)},
+      {Shape::Kind::list, 0}, identification.steps_bar);
+  visitor.number({"hold_s", "s", "from step to step", from_to(0.1, 100.0)}, identification.hold_s);
+  visitor.number({"max_theta_rad", "rad", "a segment that bends farther ends the experiment",
+                  above_to(0.0, kTwoPi)},
+                 identification.max_theta_rad);
+  visitor.number({"max_speed_radps", "rad/s", "a segment that moves faster ends the experiment",
+                  above_to(0.0, 1e4)},
+                 identification.max_speed_radps);
+  identification.rest_u_rad.resize(static_cast<std::size_t>(2 * segments), 0.0);
+  visitor.numbers({"rest_u_rad", "rad",
+                   "where the springs rest, in predictions of a recorded motion; the controller "
+                   "does not know it",
+                   from_to(-kTwoPi, kTwoPi)},
+                  {Shape::Kind::scalar_or_pairs, segments}, identification.rest_u_rad);
+  visitor.number(
+      {"cubic_nm_per_rad3", "N m/rad^3", "a spring that hardens, likewise", from_to(-1e4, 1e4)},
+      identification.cubic_nm_per_rad3);
+  visitor.number(
+      {"lag_s", "s", "first order, from set point to pressure, likewise", from_to(0.0, 100.0)},
+      identification.lag_s);
+  visitor.number({"delay_s", "s", "from set point to frame, likewise", from_to(-1.0, 100.0)},
+                 identification.delay_s);
+}
+
 void describe_chambers(SchemaVisitor& visitor, std::vector<Chamber>& chambers) {
   std::vector<double> angles;
   std::vector<double> gains;
@@ -291,6 +319,9 @@ void describe_experiment(SchemaVisitor& visitor, Experiment& experiment) {
                   SectionKind::plain, [&] { describe_plant(visitor, experiment); });
   visitor.section({"run", "", "defaults of a simulated run"}, SectionKind::plain,
                   [&] { describe_run(visitor, experiment.run); });
+  visitor.section({"identification", "", "the steps and the findings of `softarm identify`"},
+                  SectionKind::plain,
+                  [&] { describe_identification(visitor, experiment.identification, n); });
 }
 
 }  // namespace softarm

@@ -1,28 +1,28 @@
-// The step response of a simulated arm, as motion capture sees it.
+// The paper's step experiments, and the response of the simulated arm to them as motion capture
+// sees it.
 #pragma once
 
-#include <Eigen/Core>
 #include <vector>
 
+#include "identification/motion_record.hpp"
 #include "softarm/config/experiment.hpp"
 
 namespace softarm {
 
-/// Steps on every side of all segments at once, one after the other, in three sizes.
+/// Steps on every side of all segments at once, one after the other, in all sizes: pressures of
+/// `identification.steps_bar`, with actuation by torque thirds of `bend_rad`.
 struct StepPlan {
-  double bend_rad = 0.5;  ///< the largest: the moment that the configured stiffness balances there
-  double hold_s = 2.0;    ///< from step to step
+  double bend_rad =
+      0.5;              ///< the moment of the largest that the configured stiffness balances there
+  double hold_s = 2.0;  ///< from step to step
 };
 
-/// Rows are instants, a period apart.
-struct StepResponse {
-  double period_s = 0.0;
-  Eigen::MatrixXd u_rad;  ///< 2n columns, as estimated from frames, those lost interpolated
-  Eigen::MatrixXd input;  ///< what acts behind the valves: bar of every chamber, or tau_A in N m
-};
+/// The set points of every valve, step after step, within the limits of the configuration.
+std::vector<std::vector<double>> step_commands(const Experiment& experiment, const StepPlan& plan);
 
-/// Drives the configured plant, from its initial pose at rest, without any control.
+/// Drives the configured plant, from its initial pose at rest, without any control. Frames that are
+/// lost are left out; those that come carry their own time.
 /// @throws PlantError; std::runtime_error if so many frames are lost that nothing can be told
-StepResponse record_step_response(const Experiment& experiment, const StepPlan& plan);
+MotionRecord record_step_response(const Experiment& experiment, const StepPlan& plan);
 
 }  // namespace softarm

@@ -1,144 +1,218 @@
-// softarm identify: stiffness, damping and gain of the PCC model from a step response, by linear
-// least squares, as in the paper's section VI.
+// softarm identify: stiffness, damping and gains of the PCC model, as in the paper's section
+// VII-B1: from steps played on the simulated arm or from a recorded log.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <memory>
+#include <thread>
 
 #include "experiment_log.hpp"
-#include "identification/parameter_fit.hpp"
+#include "identification/coverage.hpp"
+#include "identification/fit_report.hpp"
+#include "identification/identify.hpp"
+#include "identification/log_record.hpp"
+#include "identification/model_comparison.hpp"
 #include "program.hpp"
+#include "progress.hpp"
+#include "signals.hpp"
 #include "softarm/commands.hpp"
 #include "softarm/config/load.hpp"
 
 namespace softarm {
 namespace {
 
-struct IdentifyOptions {
-  std::string config;
-  std::string output;
-  bool per_segment = false;
+struct Command {
+  std::string config, output, log, out;
+  LoggedInput input = LoggedInput::commanded;
+  FitChoice choice;
   StepPlan plan;
-  double window_s = 0.2;
+  CoverageStudy study;
+  IdentifyOptions options;
+  double from_s = 0.0, to_s = 0.0, skip_s = 0.0;
   std::uint64_t seed = 0;
-  bool has_seed = false;
+  bool has_seed = false, has_hold = false, no_lag = false, no_delay = false;
+  bool linear = false, predict = false, compare = false, coverage = false;
 };
 
-void print_line(const char* name, const std::vector<Estimated>& values, const char* unit) {
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    const std::string which = values.size() > 1 ? fmt::format(", segment {}", i + 1) : "";
-    fmt::print("{:<28}{:>12.6g} +- {:.2g} {}\n", name + which, values[i].value,
-               values[i].standard_error, unit);
-  }
+int threads() { return static_cast<int>(std::max(1U, std::thread::hardware_concurrency())); }
+
+MotionRecord record_of(const Experiment& experiment, const Command& command) {
+  if (command.log.empty()) return record_step_response(experiment, command.plan);
+  MotionRecord record = read_log(experiment, command.log, command.input);
+  const double end_s = record.time_s[record.time_s.size() - 1] + 1e-6;
+  const double to_s = command.to_s > 0.0 ? std::min(command.to_s, end_s) : end_s;
+  record = record.part(command.from_s, to_s, 0.0);
+  record.scored_from_s = command.from_s + command.skip_s;
+  return record;
 }
 
-/// One number for all segments, or a list.
-template <class Value>
-std::string yaml_list(int segments, bool per_segment, const Value& value) {
-  if (!per_segment) return fmt::format("{:.6g}", value(0));
-  std::string text = "[";
-  for (int i = 0; i < segments; ++i) text += fmt::format("{}{:.6g}", i > 0 ? ", " : "", value(i));
-  return text + "]";
-}
-
-std::string chambers_yaml(const ActuationSettings& actuation, const ParameterFit* fit) {
-  std::string text;
-  for (std::size_t i = 0; i < actuation.segments.size(); ++i) {
-    const std::size_t set = fit != nullptr && fit->gain_factor.size() > 1 ? i : 0;
-    const double factor = fit != nullptr ? fit->gain_factor[set].value : 1.0;
-    std::string angles, gains;
-    for (const Chamber& chamber : actuation.segments[i]) {
-      const char* comma = angles.empty() ? "" : ", ";
-      angles += fmt::format("{}{:.17g}", comma, chamber.angle_rad);
-      gains += fmt::format("{}{:.6g}", comma, factor * chamber.gain_nm_per_bar);
-    }
-    text += fmt::format("    - {{angle_rad: [{}], gain_nm_per_bar: [{}]}}\n", angles, gains);
-  }
-  return text;
-}
-
-/// The experiment with what was found in place of what was believed; its plant stays as it is.
-std::string identified_yaml(const Experiment& experiment, const ParameterFit& fit,
-                            const IdentifyOptions& options) {
-  namespace fs = std::filesystem;
-  const int n = experiment.arm.size();
-  const auto& plant = experiment.plant.arm.segments;
-  const auto at = [&](const std::vector<Estimated>& values) {
-    return [&values](int i) { return values[static_cast<std::size_t>(i)].value; };
-  };
-  const auto of_plant = [&](double SegmentParameters::*member) {
-    return [&plant, member](int i) { return plant[static_cast<std::size_t>(i)].*member; };
-  };
-  const fs::path folder = fs::absolute(options.output).parent_path();
-  std::string text = fmt::format(
-      "# Identified from a step response: residual {:.3g} N m rms, of moments of {:.3g} N m rms.\n"
-      "include: {}\n\narm:\n  stiffness_nm_per_rad: {}\n  damping_nms_per_rad: {}\n",
-      fit.residual_rms_nm, fit.moment_rms_nm,
-      fs::proximate(fs::absolute(options.config), folder).string(),
-      yaml_list(n, options.per_segment, at(fit.stiffness_nm_per_rad)),
-      yaml_list(n, options.per_segment, at(fit.damping_nms_per_rad)));
-  const bool gain = !fit.gain_factor.empty();
-  if (gain) text += "\nactuation:\n  chambers:\n" + chambers_yaml(experiment.actuation, &fit);
-  text += fmt::format(
-      "\n# The simulated arm is what it was.\nplant:\n  arm:\n    stiffness_nm_per_rad: {}\n"
-      "    damping_nms_per_rad: {}\n",
-      yaml_list(n, true, of_plant(&SegmentParameters::stiffness_nm_per_rad)),
-      yaml_list(n, true, of_plant(&SegmentParameters::damping_nms_per_rad)));
-  if (gain) {
-    std::string chambers = chambers_yaml(experiment.plant.actuation, nullptr);
-    for (std::size_t at_line = 0; at_line < chambers.size();
-         at_line = chambers.find('\n', at_line) + 1)
-      chambers.insert(at_line, "  ");
-    text += "  actuation:\n    chambers:\n" + chambers;
-  }
-  return text;
-}
-
-int identify(const IdentifyOptions& options) {
-  Experiment experiment = load_experiment(options.config);
-  if (options.has_seed) experiment.seed = experiment.plant.seed = options.seed;
-  const StepResponse response = record_step_response(experiment, options.plan);
-  const ParameterFit fit =
-      fit_parameters(experiment, response, options.per_segment, options.window_s);
-  print_line("stiffness k", fit.stiffness_nm_per_rad, "N m/rad");
-  print_line("damping beta", fit.damping_nms_per_rad, "N m s/rad");
-  print_line("gain over the configured", fit.gain_factor, "");
-  fmt::print("residual {:.3g} N m rms, of moments of {:.3g} N m rms; bends up to {:.3g} rad\n",
-             fit.residual_rms_nm, fit.moment_rms_nm, response.u_rad.cwiseAbs().maxCoeff());
-  if (!options.output.empty()) {
-    write_text(options.output, identified_yaml(experiment, fit, options));
-    load_experiment(options.output);
-    fmt::print("{} has them: softarm run {}\n", options.output, options.output);
-  }
+int print_coverage(const Experiment& experiment, const Command& command) {
+  catch_stop_signals();
+  Progress progress(true);
+  CoverageStudy study = command.study;
+  study.threads = threads();
+  const CoverageTable table = study_coverage(
+      experiment, command.plan, command.choice, study,
+      [&](int done) { progress.update(fmt::format("{} of {} seeds", done, study.seeds)); },
+      [] { return stop_requested != 0; });
+  fmt::print(
+      "{} seeds; errors relative to the truth, which is drawn within {:.0f} % of the "
+      "configured\n{}",
+      table.seeds, 100.0 * study.spread, coverage_text(table));
   return kExitOk;
+}
+
+void write_findings(const Experiment& experiment, const Command& command, const ParameterSet& set,
+                    const Refinement& fit) {
+  if (!command.out.empty()) {
+    const std::filesystem::path folder(command.out);
+    std::filesystem::create_directories(folder);
+    write_text(folder / "identification.csv", residuals_csv(fit));
+    fmt::print("{} has what was measured and simulated: tools/plot_identification.py {}\n",
+               (folder / "identification.csv").string(), command.out);
+  }
+  if (command.output.empty()) return;
+  const std::string note = fmt::format(
+      "Identified by softarm {} from {}: residual {:.3g} mrad rms of a motion of {:.3g} mrad rms.",
+      version_text(), command.log.empty() ? "steps on the simulated arm" : command.log,
+      1e3 * fit.rms_rad, 1e3 * fit.motion_rms_rad);
+  write_text(command.output, identified_yaml(experiment, set.arm(fit.x), command.choice, note,
+                                             command.config, command.output));
+  load_experiment(command.output);
+  fmt::print("{} has them: softarm run {}\n", command.output, command.output);
+}
+
+int identify(Command& command) {
+  Experiment experiment = load_experiment(command.config);
+  if (command.has_seed) experiment.seed = experiment.plant.seed = command.seed;
+  if (!command.has_hold) command.plan.hold_s = experiment.identification.hold_s;
+  command.choice.lag = !command.no_lag;
+  command.choice.delay = !command.no_delay;
+  if (command.coverage) return print_coverage(experiment, command);
+
+  const MotionRecord record = record_of(experiment, command);
+  const ParameterSet set(believed(experiment), experiment.actuation.kind, command.choice);
+  if (command.linear) {
+    const LinearFit fit = fit_linear_and_lag(set, record, set.believed(), command.options.window_s,
+                                             command.options.longest_lag_s);
+    fmt::print("{}", linear_table(set, fit));
+    return kExitOk;
+  }
+  Progress progress;
+  command.options.refinement.threads = threads();
+  command.options.refinement.progress = [&](const std::string& text) { progress.update(text); };
+  if (command.compare) {
+    fmt::print("{}", comparison_text(
+                         compare_models(experiment, record, command.choice, command.options,
+                                        [&](const std::string& text) { progress.update(text); })));
+    return kExitOk;
+  }
+  if (command.predict) {
+    const Refinement fit = predict(set, record, set.believed());
+    fmt::print(
+        "{} predicts u to {:.4g} mrad rms a component; the motion's own is {:.4g} mrad rms "
+        "about its mean\n",
+        command.config, 1e3 * fit.rms_rad, 1e3 * fit.motion_rms_rad);
+    write_findings(experiment, command, set, fit);
+    return kExitOk;
+  }
+  const Refinement fit = softarm::identify(set, record, command.options);
+  fmt::print("{}{}", fit_table(set, fit), conditioning_text(set, fit));
+  write_findings(experiment, command, set, fit);
+  return kExitOk;
+}
+
+void add_source_options(CLI::App& command, Command& options) {
+  command.add_option("--log", options.log,
+                     "identify from this LCM log (softarm import, lcm-logger) instead of steps");
+  const std::map<std::string, LoggedInput> inputs = {{"commanded", LoggedInput::commanded},
+                                                     {"measured", LoggedInput::measured}};
+  command.add_option("--input", options.input, "pressures of the log: commanded or measured")
+      ->transform(CLI::CheckedTransformer(inputs));
+  command.add_option("--from", options.from_s, "begin in the log, s after its first frame");
+  command.add_option("--to", options.to_s, "end in the log (default: its end)");
+  command.add_option("--skip", options.skip_s, "simulate so many s before comparing");
+  command
+      .add_option("--bend", options.plan.bend_rad,
+                  "with actuation by torque: largest step, as the bend in rad that the "
+                  "configured stiffness would allow")
+      ->check(CLI::Range(0.01, 3.0))
+      ->capture_default_str();
+}
+
+void add_choice_options(CLI::App& command, Command& options) {
+  command.add_flag("--per-segment", options.choice.per_segment,
+                   "k and beta of every segment instead of one for all");
+  const std::map<std::string, GainSharing> sharing = {{"arm", GainSharing::arm},
+                                                      {"side", GainSharing::side},
+                                                      {"segment", GainSharing::segment},
+                                                      {"chamber", GainSharing::chamber}};
+  command
+      .add_option("--gains", options.choice.gains,
+                  "gains of their own for: arm, side, segment or (default) chamber")
+      ->transform(CLI::CheckedTransformer(sharing));
+  command.add_flag("--no-lag", options.no_lag, "the lag is identification.lag_s");
+  command.add_flag("--no-delay", options.no_delay, "the delay is identification.delay_s");
+  command.add_flag("--rest", options.choice.rest, "seek where the springs rest");
+  command.add_flag("--cubic", options.choice.cubic, "seek a cubic stiffness");
+  command.add_flag("--directions", options.choice.directions,
+                   "seek the direction into which every chamber pushes");
+  command
+      .add_option("--prior", options.options.refinement.prior,
+                  "how far, in parts of it, every number may be off what is configured (one "
+                  "standard deviation); 0: nothing is known before")
+      ->check(CLI::Range(0.0, 1e6))
+      ->capture_default_str();
 }
 
 }  // namespace
 
 void add_identify_command(CLI::App& app) {
-  auto options = std::make_shared<IdentifyOptions>();
+  auto options = std::make_shared<Command>();
   CLI::App* command = app.add_subcommand(
-      "identify", "Stiffness, damping and gain from a step response of the simulated arm");
+      "identify", "Stiffness, damping, gains and lag from steps or from a recorded motion");
   command->add_option("CONFIG", options->config, "experiment in YAML")->required();
   command->add_option("--output", options->output,
                       "write an experiment that includes CONFIG and has the values found");
-  command->add_flag("--per-segment", options->per_segment,
-                    "values for every segment instead of one for all");
+  command->add_option("--out", options->out, "folder for what plots need");
+  add_source_options(*command, *options);
+  add_choice_options(*command, *options);
+  command->add_flag("--linear", options->linear,
+                    "linear least squares alone: quick, biased by noise and smoothing");
+  command->add_flag("--predict", options->predict,
+                    "identify nothing: how well does CONFIG predict the motion?");
+  command->add_flag("--compare", options->compare,
+                    "what each term more buys, on the whole and between the halves");
+  auto* hold = command->add_option("--hold", options->plan.hold_s, "time between steps in s")
+                   ->check(CLI::Range(0.1, 100.0));
   command
-      ->add_option("--bend", options->plan.bend_rad,
-                   "largest step, as the bend in rad that the configured stiffness would allow")
-      ->check(CLI::Range(0.01, 3.0))
+      ->add_option("--longest-lag", options->options.longest_lag_s,
+                   "longest lag in s that the start of the search considers")
+      ->check(CLI::Range(0.0, 100.0))
       ->capture_default_str();
-  command->add_option("--hold", options->plan.hold_s, "time between steps in s")
-      ->check(CLI::Range(0.1, 100.0))
-      ->capture_default_str();
-  command->add_option("--window", options->window_s, "width of the smoothing window in s")
+  command
+      ->add_option("--window", options->options.window_s,
+                   "width in s of the window that smooths for the start")
       ->check(CLI::Range(0.005, 10.0))
       ->capture_default_str();
   auto* seed = command->add_option("--seed", options->seed,
                                    "seed of noise and dropouts (default: the configuration's)");
-  command->callback([options, seed] {
+  auto* seeds = command
+                    ->add_option("--seeds", options->study.seeds,
+                                 "do it on so many arms drawn at random, and print how often the "
+                                 "intervals hold the truth")
+                    ->check(CLI::Range(1, 100000));
+  command
+      ->add_option("--spread", options->study.spread,
+                   "with --seeds: how far the truth is off the configured, at most")
+      ->check(CLI::Range(0.0, 0.9))
+      ->capture_default_str();
+  command->callback([options, seed, seeds, hold] {
     options->has_seed = seed->count() > 0;
+    options->has_hold = hold->count() > 0;
+    options->coverage = seeds->count() > 0;
+    options->study.window_s = options->options.window_s;
     if (const int code = identify(*options); code != kExitOk) throw CLI::RuntimeError(code);
   });
 }

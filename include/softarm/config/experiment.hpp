@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <string>
 
+#include "softarm/config/identification_settings.hpp"
 #include "softarm/daemon/pipeline_settings.hpp"
 #include "softarm/plant/settings.hpp"
 #include "softarm/valves/settings.hpp"
@@ -22,6 +23,7 @@ struct Experiment : PipelineSettings {
   PlantSettings plant;
   ValveDriverSettings valves;
   RunSettings run;
+  IdentificationSettings identification;
   std::uint64_t hash = 0;  ///< FNV-1a of the resolved configuration's text
 };
 

@@ -1,0 +1,19 @@
+// A record to parameters: linear least squares for a start, then the simulated response.
+#pragma once
+
+#include "identification/linear_fit.hpp"
+#include "identification/refinement.hpp"
+
+namespace softarm {
+
+struct IdentifyOptions {
+  double window_s = 0.2;       ///< of the smoothing for the start
+  double longest_lag_s = 0.5;  ///< that the start considers
+  RefinementOptions refinement;
+};
+
+/// @throws std::runtime_error as `fit_linear` and `refine`
+Refinement identify(const ParameterSet& set, const MotionRecord& record,
+                    const IdentifyOptions& options);
+
+}  // namespace softarm
