@@ -1,5 +1,5 @@
 // softarm identify: stiffness, damping and gains of the PCC model, as in the paper's section
-// VII-B1: from steps played on the simulated arm or from a recorded log.
+// VII-B1: from steps played on the simulated arm, in lock step or over LCM, or from a recorded log.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -11,6 +11,7 @@
 #include "identification/coverage.hpp"
 #include "identification/fit_report.hpp"
 #include "identification/identify.hpp"
+#include "identification/live_experiment.hpp"
 #include "identification/log_record.hpp"
 #include "identification/model_comparison.hpp"
 #include "program.hpp"
@@ -32,12 +33,25 @@ struct Command {
   double from_s = 0.0, to_s = 0.0, skip_s = 0.0;
   std::uint64_t seed = 0;
   bool has_seed = false, has_hold = false, no_lag = false, no_delay = false;
-  bool linear = false, predict = false, compare = false, coverage = false;
+  bool linear = false, predict = false, compare = false, coverage = false, live = false;
 };
 
 int threads() { return static_cast<int>(std::max(1U, std::thread::hardware_concurrency())); }
 
+MotionRecord play(const Experiment& experiment, const Command& command) {
+  catch_stop_signals();
+  ignore_broken_pipes();
+  Progress progress(true);
+  const LiveOutcome outcome = play_steps(
+      experiment, command.plan, [] { return stop_requested != 0; },
+      [&](const std::string& text) { progress.update(text); });
+  if (!outcome.aborted.empty())
+    throw std::runtime_error("vented, nothing identified: " + outcome.aborted);
+  return outcome.record;
+}
+
 MotionRecord record_of(const Experiment& experiment, const Command& command) {
+  if (command.live) return play(experiment, command);
   if (command.log.empty()) return record_step_response(experiment, command.plan);
   MotionRecord record = read_log(experiment, command.log, command.input);
   const double end_s = record.time_s[record.time_s.size() - 1] + 1e-6;
@@ -75,7 +89,10 @@ void write_findings(const Experiment& experiment, const Command& command, const 
   if (command.output.empty()) return;
   const std::string note = fmt::format(
       "Identified by softarm {} from {}: residual {:.3g} mrad rms of a motion of {:.3g} mrad rms.",
-      version_text(), command.log.empty() ? "steps on the simulated arm" : command.log,
+      version_text(),
+      command.live          ? "steps on the running arm"
+      : command.log.empty() ? "steps on the simulated arm"
+                            : command.log,
       1e3 * fit.rms_rad, 1e3 * fit.motion_rms_rad);
   write_text(command.output, identified_yaml(experiment, set.arm(fit.x), command.choice, note,
                                              command.config, command.output));
@@ -124,8 +141,14 @@ int identify(Command& command) {
 }
 
 void add_source_options(CLI::App& command, Command& options) {
-  command.add_option("--log", options.log,
-                     "identify from this LCM log (softarm import, lcm-logger) instead of steps");
+  auto* log = command.add_option(
+      "--log", options.log,
+      "identify from this LCM log (softarm import, lcm-logger) instead of steps");
+  command
+      .add_flag("--live", options.live,
+                "play the steps over LCM on the running plant or hardware, within the limits of "
+                "the section identification; Ctrl-C vents")
+      ->excludes(log);
   const std::map<std::string, LoggedInput> inputs = {{"commanded", LoggedInput::commanded},
                                                      {"measured", LoggedInput::measured}};
   command.add_option("--input", options.input, "pressures of the log: commanded or measured")
