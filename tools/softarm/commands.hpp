@@ -21,7 +21,7 @@ void add_check_command(CLI::App& app);
 /// softarm eval FILE [--mass point|distributed] [--method direct|augmented]
 void add_eval_command(CLI::App& app);
 
-/// softarm identify CONFIG [--output FILE] [--per-segment]
+/// softarm identify CONFIG [--live | --log LOG] [--output FILE] [--seeds N]
 void add_identify_command(CLI::App& app);
 
 /// softarm import CSV MAP.yaml --out LOG

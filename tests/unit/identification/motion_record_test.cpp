@@ -45,8 +45,8 @@ TEST(LaggedInput, OfMeasurementsFollowsStraightLines) {
   LaggedInput lagged(input, 0.04, 0.02);
   Eigen::VectorXd got(2);
   Eigen::Vector2d state = input.value.row(0);
-  const double h = 1e-6;
-  for (int k = 0; k < 700000; ++k) {
+  const double h = 1e-5;
+  for (int k = 0; k < 70000; ++k) {
     const double t = (k + 0.5) * h - 0.02;  // middle of the step, before the delay
     Eigen::Vector2d c = input.value.row(t < 0.5 ? 0 : 3);
     for (Eigen::Index i = 0; i + 1 < 4; ++i)
@@ -54,7 +54,7 @@ TEST(LaggedInput, OfMeasurementsFollowsStraightLines) {
         c = input.value.row(i) + (t - input.time_s[i]) / (input.time_s[i + 1] - input.time_s[i]) *
                                      (input.value.row(i + 1) - input.value.row(i));
     state += h / 0.04 * (c - state);
-    if ((k + 1) % 50000 != 0) continue;
+    if ((k + 1) % 5000 != 0) continue;
     lagged.at((k + 1) * h, got);
     EXPECT_NEAR((got - state).norm(), 0.0, 1e-5) << k;
   }
@@ -66,7 +66,7 @@ TEST(LaggedInput, JumpsWithoutALagWhereTheSetPointDoes) {
   Eigen::VectorXd got(2);
   lagged.at(0.3, got);
   EXPECT_EQ(got[0], 0.0);
-  lagged.at(0.375, got, true);  // a quarter after 0.125: nothing yet
+  lagged.at(0.375, got, true);
   EXPECT_EQ(got[0], 0.6);
   lagged.at(0.75, got, true);
   EXPECT_EQ(got[0], 0.2);

@@ -24,6 +24,8 @@ inline Experiment one_segment() {
 inline MotionRecord plant_record(const Experiment& experiment, int steps, double bar, double hold_s,
                                  double rate_hz) {
   PlantSettings settings = experiment.plant;
+  settings.method = IntegratorMethod::cash4;
+  settings.max_step_s = 0.0;
   settings.relative_tolerance = 1e-10;
   settings.absolute_tolerance = 1e-12;
   ArmPlant plant(settings);
