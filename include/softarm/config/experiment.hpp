@@ -11,12 +11,14 @@
 
 namespace softarm {
 
+/// Defaults of a simulated run.
 struct RunSettings {
   double duration_s = 20.0;      ///< default of `softarm run` and tools/demo
   double tracking_from_s = 1.0;  ///< after ACTIVE; tracking errors count from here on
   double log_rate_hz = 0.0;      ///< rows of log.csv, from which errors are taken; 0: every tick
 };
 
+/// An experiment as its file says it, defaults filled in.
 struct Experiment : PipelineSettings {
   std::string name;
   std::uint64_t seed = 1;

@@ -43,6 +43,7 @@ struct ReferenceWindow {
   double interval_s = 0.0;  ///< time from `before` to `after`; 0: only `now` is filled in
 };
 
+/// What became of a live reference.
 enum class LiveVerdict {
   accepted,
   not_live,    ///< the phase of this time does not listen

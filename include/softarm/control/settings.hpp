@@ -11,6 +11,7 @@
 
 namespace softarm {
 
+/// Coordinates of the control law.
 enum class ControlCoordinates {
   u,     ///< the controller (17) in u: smooth everywhere
   polar  ///< (17) in the paper's (phi, theta) with gains such as (23)
@@ -33,6 +34,7 @@ struct TaskSpaceSettings {
   double posture_rate_1ps = 2.0;      ///< null space of J: u decays at this rate, towards less bend
 };
 
+/// The controller (17): its terms, gains and limits.
 struct ControllerSettings {
   ControlCoordinates coordinates = ControlCoordinates::u;
   ControlTerms terms;
@@ -71,11 +73,12 @@ struct PaperReference {
   double phase_step_rad = 1.0471975511965976;  ///< pi/3 from segment to segment
 };
 
-/// Smooth motion through way points: minimum-jerk (quintic) pieces, at rest in every point.
+/// Where the arm is to be at a time of the phase.
 struct WayPoint {
   double time_s = 0.0;
   std::vector<double> u_rad;  ///< 2n
 };
+/// Smooth motion through way points: minimum-jerk (quintic) pieces, at rest in every point.
 struct WayPointReference {
   std::vector<WayPoint> points;
   bool repeat = false;
@@ -86,6 +89,7 @@ struct LiveReference {
   double timeout_s = 0.2;  ///< silence after which the last received u is held at rest
 };
 
+/// Path p_d(t) of the tip in the world.
 enum class TipPathShape {
   point,      ///< p_d = centre
   circle,     ///< p_d = centre + first_axis cos(rate t) + second_axis sin(rate t); an ellipse
@@ -110,6 +114,7 @@ struct ReferencePhase {
   double duration_s = 0.0;  ///< ignored for the last phase
 };
 
+/// What the arm is to follow: phases, one after the other.
 struct ReferenceSettings {
   std::vector<ReferencePhase> phases;
 };

@@ -10,6 +10,7 @@
 
 namespace softarm {
 
+/// Everything the pipeline of a tick is built from.
 struct PipelineSettings {
   ArmParameters arm;  ///< what the controller believes
   EstimationSettings estimation;

@@ -10,6 +10,7 @@
 
 namespace softarm {
 
+/// What it takes, besides good frames, before the arm is moved.
 enum class Arming {
   automatic,  ///< ACTIVE as soon as good frames come (the simulated arm)
   explicit_   ///< waits for an operator's `arm`
@@ -40,6 +41,7 @@ struct SafetySettings {
   double deadman_timeout_s = 0.2;  ///< without a "go", where there is a dead-man input
 };
 
+/// The place of the daemon on the machine.
 struct RealtimeSettings {
   bool fifo = false;  ///< SCHED_FIFO for the tick
   int priority = 50;
@@ -51,6 +53,7 @@ struct RealtimeSettings {
 /// latency of either way.
 using CaptureTime = ClockMode;
 
+/// LCM provider and channels; distinct where two arms share a machine.
 struct LcmSettings {
   std::string url = "udpm://239.255.76.67:7667?ttl=0";
   std::string mocap_channel = "SOFTARM_MOCAP";
@@ -73,6 +76,7 @@ struct BodySettings {
   std::vector<int> segment_ids;  ///< n ids, from the base to the tip
 };
 
+/// Rate, safety and connections of softarmd.
 struct DaemonSettings {
   double rate_hz = 500.0;
   SafetySettings safety;

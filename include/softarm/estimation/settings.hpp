@@ -3,12 +3,14 @@
 
 namespace softarm {
 
+/// What u is taken from.
 enum class CurvatureMethod {
   pose,         ///< position and orientation, weighted by both frames' noise
   orientation,  ///< orientation alone: inertial sensors
   printed       ///< the paper's (20) as printed, for comparison only
 };
 
+/// From motion-capture frames to u: method, noise, and which frames are refused.
 struct EstimationSettings {
   CurvatureMethod method = CurvatureMethod::pose;
   /// Standard deviations an axis of every measured body: of its position, and of its rotation

@@ -12,6 +12,7 @@
 
 namespace softarm {
 
+/// Where the driver stands with its terminal, and what it writes.
 enum class ValveState : std::int8_t {
   disconnected,  ///< the terminal vents by its own time-out; the next attempt waits its turn
   securing,      ///< connected: that time-out is being set and read back; no pressure is written
@@ -50,6 +51,7 @@ enum class ValveAction {
   exchange  ///< write `set_points_bar`, read pressures back, then `exchanged`
 };
 
+/// What the guard has to know of the terminal and the arm.
 struct ValveGuardSettings {
   ValveDriverSettings driver;
   int chambers = 1;  ///< >= 1
@@ -58,6 +60,7 @@ struct ValveGuardSettings {
   bool wait_for_zero = false;   ///< after a doubt (and at first) commands must have been zero once
 };
 
+/// What happened since the start of the driver.
 struct ValveCounters {
   std::int64_t cycles = 0;  ///< exchanges that went well
   std::int64_t connections = 0;
