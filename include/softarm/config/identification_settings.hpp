@@ -6,6 +6,7 @@
 
 namespace softarm {
 
+/// The steps that `softarm identify` plays, and the model it fits.
 struct IdentificationSettings {
   std::vector<double> steps_bar = {0.2, 0.4, 0.6};  ///< on every side in turn, as in VII-B1
   double hold_s = 2.0;                              ///< from step to step
