@@ -93,6 +93,14 @@ void EventLogReader::add_damage(std::int64_t begin, std::int64_t end) {
   if (damages_.size() < kDamagesKept) damages_.push_back({begin, end});
 }
 
+std::string EventLogReader::damage_text() const {
+  if (damages_.empty()) return "";
+  const LogDamage& first = damages_.front();
+  return "bytes " + std::to_string(first.begin) + " to " + std::to_string(first.end) +
+         " are damaged or cut, " + std::to_string(damage_count_) + " stretches and " +
+         std::to_string(damaged_bytes_) + " bytes in all; what precedes and follows them was used";
+}
+
 bool EventLogReader::next(LogEvent& event) {
   at_ += std::exchange(event_, 0);
   const std::int64_t begin = position();

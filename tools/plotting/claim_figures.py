@@ -174,7 +174,7 @@ def plants(results, path):
     handles = [Line2D([], [], color=colour, marker=style[0], linestyle=style[1:], markersize=3.5, label=method)
                for method, (colour, style) in METHOD_STYLE.items()]
     handles += [Line2D([], [], label="the default", **DEFAULT_STYLE), Line2D([], [], label="plain CVODE", **PLAIN_STYLE)]
-    finish(figure, path, "Simulated arms", handles, row_gap=0.5)
+    finish(figure, path, "Simulated arms: speed over error", handles, row_gap=0.5)
 
 
 def draw_all(results, folder):

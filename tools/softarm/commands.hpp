@@ -30,6 +30,9 @@ void add_import_command(CLI::App& app);
 /// softarm replay LOG CONFIG [--any-configuration] [--json]
 void add_replay_command(CLI::App& app);
 
+/// softarm report LOG CONFIG [--out DIR]
+void add_report_command(CLI::App& app);
+
 /// softarm run CONFIG [--out DIR] [--duration S] [--seed N]
 void add_run_command(CLI::App& app);
 

@@ -1,9 +1,6 @@
 // softarm run: the daemon's pipeline and the simulated arm in one process, in lock step, as fast as
 // the machine allows.
 #include <fmt/format.h>
-#include <spawn.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include <cmath>
 #include <filesystem>
@@ -12,6 +9,7 @@
 #include "experiment_log.hpp"
 #include "lock_step.hpp"
 #include "logged_run.hpp"
+#include "plots.hpp"
 #include "program.hpp"
 #include "progress.hpp"
 #include "shape_log.hpp"
@@ -57,31 +55,6 @@ std::int64_t record(Stepper& stepper, double duration_s, double period_s, std::i
   return monotonic_now_ns() - before_ns;
 }
 
-/// The plotting script: beside an installed program, else in the source tree this was built from.
-std::filesystem::path plot_script() {
-  std::error_code error;
-  const auto installed =
-      std::filesystem::read_symlink("/proc/self/exe", error).parent_path().parent_path() / "share" /
-      "softarm" / "plot_run.py";
-  return std::filesystem::exists(installed, error) ? installed
-                                                   : std::filesystem::path(SOFTARM_PLOT_SCRIPT);
-}
-
-/// A run without plots is still a run: what is missing is said, not thrown.
-void plot(const std::string& out) {
-  const std::string script = plot_script().string();
-  char* const arguments[] = {const_cast<char*>("/usr/bin/python3"),
-                             const_cast<char*>(script.c_str()), const_cast<char*>(out.c_str()),
-                             nullptr};
-  pid_t child = 0;
-  int status = 0;
-  const bool drawn = posix_spawn(&child, arguments[0], nullptr, nullptr, arguments, environ) == 0 &&
-                     waitpid(child, &status, 0) == child && status == 0;
-  if (!drawn)
-    print_error("softarm",
-                "no plots: is python3-matplotlib installed? Use --no-plots to do without");
-}
-
 int run(const RunOptions& options) {
   Experiment experiment = load_experiment(options.config);
   if (options.has_seed) experiment.seed = experiment.plant.seed = options.seed;
@@ -118,14 +91,9 @@ int run(const RunOptions& options) {
   write_text(out / "timing.json", timing_json(timing));
   fmt::print("{}{:.0f} times faster than real time; log, summary and timing are in {}\n",
              summary.table(), timing.real_time_factor, options.out);
-  if (options.plots) plot(options.out);
+  if (options.plots) draw_plots(options.out);
   if (logged && logged->log().damage_count() > 0) {
-    const LogDamage& first = logged->log().damages().front();
-    print_error("softarm",
-                fmt::format("{}: bytes {} to {} are damaged or cut, {} stretches and {} bytes in "
-                            "all; what precedes and follows them was used",
-                            options.mocap_log, first.begin, first.end, logged->log().damage_count(),
-                            logged->log().damaged_bytes()));
+    print_error("softarm", options.mocap_log + ": " + logged->log().damage_text());
     return kExitData;
   }
   return kExitOk;

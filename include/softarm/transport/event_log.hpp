@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <istream>
 #include <span>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -51,6 +52,8 @@ class EventLogReader {
   const std::vector<LogDamage>& damages() const { return damages_; }
   std::int64_t damage_count() const { return damage_count_; }
   std::int64_t damaged_bytes() const { return damaged_bytes_; }
+  /// For people; empty where nothing is damaged.
+  std::string damage_text() const;
 
  private:
   std::size_t available(std::size_t wanted);
