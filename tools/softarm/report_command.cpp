@@ -53,11 +53,11 @@ int report(const ReportOptions& options) {
     return kExitData;
   }
   if (static_cast<std::uint64_t>(record.status().configuration_hash) != experiment.hash) {
-    print_error("softarm",
-                fmt::format("warning: the log was made with configuration {:016x}, {} is "
-                            "{:016x}: names and limits in the report are those of the latter",
-                            static_cast<std::uint64_t>(record.status().configuration_hash),
-                            options.config, experiment.hash));
+    say(fmt::format(
+        "softarm: warning: the log was made with configuration {:016x}, {} is {:016x}: what the "
+        "report takes from the configuration may not be what was in force\n",
+        static_cast<std::uint64_t>(record.status().configuration_hash), options.config,
+        experiment.hash));
   }
   fmt::print("{}log, summary and timing are in {}\n", record.table(), options.out);
   if (options.plots) draw_plots(options.out);
