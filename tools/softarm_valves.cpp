@@ -13,6 +13,7 @@
 #include "softarm/actuation/pressure_allocator.hpp"
 #include "softarm/config/load.hpp"
 #include "softarm/daemon/realtime.hpp"
+#include "softarm/daemon/service_notifier.hpp"
 #include "softarm/modbus/modbus_terminal.hpp"
 #include "softarm/transport/lcm_node.hpp"
 #include "softarm/transport/message_decoding.hpp"
@@ -88,10 +89,11 @@ class TerminalLink {
 
 class ValveLoop {
  public:
-  ValveLoop(const Experiment& experiment, LineLog& log)
+  ValveLoop(const Experiment& experiment, LineLog& log, ServiceNotifier& service)
       : lcm_(experiment.daemon.lcm),
         settings_(experiment.valves),
         log_(log),
+        service_(service),
         node_(lcm_.url),
         link_(experiment.valves, experiment.actuation.max_pressure_bar),
         guard_(guard_settings(experiment)),
@@ -121,9 +123,14 @@ class ValveLoop {
         guard_.stop();
       }
       cycle(now_ns);
-      late_cycles_ += deadline.advance(monotonic_now_ns());
+      const std::int64_t missed = deadline.advance(monotonic_now_ns());
+      late_cycles_ += missed;
       publish_status(now_ns);
       report(now_ns - start_ns);
+      service_.report(now_ns, {.state = name(guard_.state()),
+                               .reason = name(guard_.reason()),
+                               .on_time = missed == 0,
+                               .stopping = stop_ns != 0});
       if (stop_ns == 0) continue;
       const bool may_still =
           guard_.state() != ValveState::disconnected && now_ns - stop_ns < kMostStopping_ns;
@@ -270,6 +277,7 @@ class ValveLoop {
   LcmSettings lcm_;
   ValveDriverSettings settings_;
   LineLog& log_;
+  ServiceNotifier& service_;
   LcmNode node_;
   TerminalLink link_;
   ValveGuard guard_;
@@ -307,13 +315,16 @@ int serve(const std::string& path) {
   if (valves.host != "127.0.0.1")
     say("softarm-valves: warning: these registers were not tried on hardware; see "
         "docs/valves.md\n");
+  ServiceNotifier service;
+  if (!service.problem().empty())
+    say(fmt::format("softarm-valves: warning: {}\n", service.problem()));
   LineLog log("softarm-valves");  // before the scheduling changes, which its thread would inherit
   RealtimeSettings realtime = experiment.daemon.realtime;
   realtime.cpu = -1;  // the tick's own
   realtime.priority = std::max(1, realtime.priority - 1);
   for (const std::string& refused : apply_realtime_settings(realtime))
     say(fmt::format("softarm-valves: warning: {}\n", refused));
-  ValveLoop loop(experiment, log);
+  ValveLoop loop(experiment, log, service);
   const bool vented = loop.run();
   log.finish();
   loop.print_summary();

@@ -11,6 +11,7 @@
 #include "signals.hpp"
 #include "softarm/config/load.hpp"
 #include "softarm/daemon/realtime.hpp"
+#include "softarm/daemon/service_notifier.hpp"
 #include "softarm/transport/daemon_link.hpp"
 
 namespace softarm {
@@ -88,7 +89,7 @@ class ModeLog {
 /// Keeps the deadline, and the account of how well it was kept.
 class DaemonLoop {
  public:
-  DaemonLoop(const Experiment& experiment, bool shadow, ModeLog& log)
+  DaemonLoop(const Experiment& experiment, bool shadow, ModeLog& log, ServiceNotifier& service)
       : pipeline_(experiment),
         link_(experiment,
               {.version = fmt::format("{} {}", version_text(), commit_text()),
@@ -97,7 +98,8 @@ class DaemonLoop {
                .build = build_text()},
               shadow),
         ticks_per_second_(static_cast<std::int64_t>(experiment.daemon.rate_hz)),
-        log_{.log = log} {}
+        log_{.log = log},
+        service_(service) {}
 
   /// Returns once a stop was requested and every pressure has been commanded to zero.
   void run() {
@@ -118,6 +120,10 @@ class DaemonLoop {
       missed_in_row_ =
           missed > 0 ? missed_in_row_ + static_cast<int>(std::min(missed, kManyMissed)) : 0;
       log_.log.malformed(link_.malformed());
+      service_.report(woken_ns, {.state = name(pipeline_.output().mode),
+                                 .reason = name(pipeline_.output().reason),
+                                 .on_time = missed == 0,
+                                 .stopping = stop_requested != 0});
       if (stop_requested != 0 && pipeline_.output().reason == Reason::shutdown &&
           pipeline_.fully_vented())
         ++vented_commands;
@@ -172,6 +178,7 @@ class DaemonLoop {
   int missed_in_row_ = 0;
   LoopTiming timing_;
   ModeWatch log_;
+  ServiceNotifier& service_;
 };
 
 void print_summary(const DaemonLoop& loop) {
@@ -208,15 +215,21 @@ int serve(const std::string& path, bool shadow) {
                   shadow ? ", shadow: commands are marked as not for the valves" : ""));
   for (const std::string& warning : experiment_warnings(experiment))
     say(fmt::format("softarmd: warning: {}\n", warning));
+  ServiceNotifier service;
+  if (!service.problem().empty()) say(fmt::format("softarmd: warning: {}\n", service.problem()));
   // A thread inherits the scheduling in force when it starts. The one that prints gets none of it;
   // LCM's receive thread stays one below the tick, which a flood of messages would else starve.
   ModeLog log;
-  RealtimeSettings below_tick = experiment.daemon.realtime;
-  below_tick.priority = std::max(1, below_tick.priority - 1);
-  for (const std::string& refused : apply_realtime_settings(below_tick))
+  // The tick's own priority is asked for first, and its refusal told: whatever is refused later is
+  // the same, or less was asked for.
+  const RealtimeSettings& realtime = experiment.daemon.realtime;
+  for (const std::string& refused : apply_realtime_settings(realtime))
     say(fmt::format("softarmd: warning: {}\n", refused));
-  DaemonLoop loop(experiment, shadow, log);
-  apply_realtime_settings(experiment.daemon.realtime);  // what is refused was told above
+  RealtimeSettings below_tick = realtime;
+  below_tick.priority = std::max(1, below_tick.priority - 1);
+  apply_realtime_settings(below_tick);
+  DaemonLoop loop(experiment, shadow, log, service);
+  apply_realtime_settings(realtime);
   loop.run();
   log.finish();
   print_summary(loop);

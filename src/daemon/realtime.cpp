@@ -18,6 +18,15 @@ namespace softarm {
 namespace {
 
 constexpr std::int64_t kNsPerSecond = 1'000'000'000;
+constexpr std::size_t kPrefaultedStack = std::size_t{256} * 1024;
+
+/// A stack grows by page faults, also when memory is locked: every page that a tick may need is
+/// touched before. Not inlined, or the caller would keep the array.
+[[gnu::noinline]] void prefault_stack() noexcept {
+  char pages[kPrefaultedStack];
+  volatile char* const touched = pages;
+  for (std::size_t at = 0; at < kPrefaultedStack; at += 1024) touched[at] = 0;
+}
 
 }  // namespace
 
@@ -44,10 +53,13 @@ std::vector<std::string> apply_realtime_settings(const RealtimeSettings& setting
                         std::strerror(error) +
                         "; choose daemon.realtime.cpu among the CPUs of this machine");
   }
-  if (settings.lock_memory && mlockall(MCL_CURRENT | MCL_FUTURE) != 0)
-    refused.push_back(
-        std::string("cannot lock memory: ") + std::strerror(errno) +
-        "; run as root or raise the limit (ulimit -l unlimited, LimitMEMLOCK=infinity)");
+  if (settings.lock_memory) {
+    if (mlockall(MCL_CURRENT | MCL_FUTURE) != 0)
+      refused.push_back(
+          std::string("cannot lock memory: ") + std::strerror(errno) +
+          "; run as root or raise the limit (ulimit -l unlimited, LimitMEMLOCK=infinity)");
+    prefault_stack();
+  }
   if (settings.fifo) {
     const sched_param parameter{.sched_priority = settings.priority};
     if (const int error = pthread_setschedparam(pthread_self(), SCHED_FIFO, &parameter); error != 0)

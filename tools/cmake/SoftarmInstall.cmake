@@ -16,3 +16,9 @@ install(FILES ${PROJECT_BINARY_DIR}/softarmConfig.cmake ${PROJECT_BINARY_DIR}/so
 install(PROGRAMS tools/plot_run.py DESTINATION ${CMAKE_INSTALL_DATADIR}/softarm)
 install(DIRECTORY tools/plotting DESTINATION ${CMAKE_INSTALL_DATADIR}/softarm
   FILES_MATCHING PATTERN "*.py" PATTERN "__pycache__" EXCLUDE)
+# systemd units: softarmd@NAME, softarm-valves@NAME (docs/service.md).
+install(FILES docs/service.md DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT units)
+install(CODE "set(SOFTARM_UNITS \"${PROJECT_SOURCE_DIR}/config/systemd\")
+set(SOFTARM_BIN \"${CMAKE_INSTALL_BINDIR}\")
+set(SOFTARM_DOC \"${CMAKE_INSTALL_DOCDIR}\")" COMPONENT units)
+install(SCRIPT tools/cmake/InstallUnits.cmake COMPONENT units)

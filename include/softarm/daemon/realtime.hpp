@@ -16,8 +16,10 @@ std::int64_t monotonic_now_ns() noexcept;
 /// Sleeps until an absolute time of CLOCK_MONOTONIC; returns early when a signal arrives.
 void sleep_until_ns(std::int64_t deadline_ns) noexcept;
 
-/// Applies scheduling, pinning and memory locking to the calling thread and process. What the
-/// machine does not permit is left undone and reported: one line each, with the cure.
+/// Applies scheduling, pinning and memory locking to the calling thread and process; with locked
+/// memory 256 KiB of the calling thread's stack are there already, so that they cause no page fault
+/// later. What the machine does not permit is left undone and reported: one line each, with the
+/// cure.
 std::vector<std::string> apply_realtime_settings(const RealtimeSettings& settings);
 
 /// Whether the calling thread runs under SCHED_FIFO.

@@ -49,10 +49,6 @@ struct RealtimeSettings {
   bool lock_memory = false;
 };
 
-/// How a frame's capture time is brought to our monotonic clock; `frame_latency_s` is the declared
-/// latency of either way.
-using CaptureTime = ClockMode;
-
 /// LCM provider and channels; distinct where two arms share a machine.
 struct LcmSettings {
   std::string url = "udpm://239.255.76.67:7667?ttl=0";
@@ -81,7 +77,9 @@ struct DaemonSettings {
   double rate_hz = 500.0;
   SafetySettings safety;
   RealtimeSettings realtime;
-  CaptureTime capture_time = CaptureTime::sender;
+  /// How a frame's capture time is brought to our monotonic clock; safety.frame_latency_s is the
+  /// declared latency of either way.
+  ClockMode capture_time = ClockMode::sender;
   LcmSettings lcm;
   BodySettings bodies;
 };

@@ -48,6 +48,13 @@ class Process {
 
   void signal(int number) const { kill(pid_, number); }
 
+  /// Stops it, and returns once it does not run any more.
+  void stop() const {
+    signal(SIGSTOP);
+    siginfo_t stopped{};
+    waitid(P_PID, static_cast<id_t>(pid_), &stopped, WSTOPPED | WNOWAIT);
+  }
+
   /// Exit code (128 + signal where one ended it), or -1 if it still runs after `patience`.
   int wait(std::chrono::milliseconds patience) {
     const auto end = std::chrono::steady_clock::now() + patience;
