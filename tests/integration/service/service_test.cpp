@@ -12,7 +12,8 @@ using namespace std::chrono_literals;
 using test::AddressKind;
 using test::NotifySocket;
 
-constexpr int kWatchdog_ms = 200;
+constexpr int kWatchdog_ms = 300;
+constexpr double kPatience_s = 30.0;
 
 class Service : public ::testing::TestWithParam<AddressKind>, protected test::Station {
  protected:
@@ -22,18 +23,22 @@ class Service : public ::testing::TestWithParam<AddressKind>, protected test::St
     } catch (const TransportError& error) {
       GTEST_SKIP() << error.what();
     }
+    // Thresholds that a busy machine does not reach by itself.
+    write_config("paper_arm.yaml",
+                 "  safety: {hold_after_s: 0.1, vent_after_s: 0.25, good_frames: 20}\n");
     setenv("WATCHDOG_USEC", std::to_string(1000 * kWatchdog_ms).c_str(), 1);
   }
 
   /// Reads on until the manager is told this; what came later stays to be read.
   bool hears(const std::string& text) {
-    return wait_for([&] {
+    const auto reads_it = [&] {
       for (std::string told = manager_.next(); !told.empty(); told = manager_.next()) {
         heard_ += told;
         if (told.find(text) != std::string::npos) return true;
       }
       return false;
-    });
+    };
+    return wait_for(reads_it, kPatience_s);
   }
 
   NotifySocket manager_{GetParam()};
@@ -56,7 +61,7 @@ TEST_P(Service, HearsOfReadinessModesHealthAndStop) {
   ASSERT_TRUE(hears("STATUS=VENT (time_gap)\n")) << daemon->printed();
   ASSERT_TRUE(hears("WATCHDOG=1")) << daemon->printed();
 
-  ASSERT_TRUE(wait_for([&] { return under_pressure() && active_in_row_ > 0; }))
+  ASSERT_TRUE(wait_for([&] { return under_pressure() && active_in_row_ > 0; }, kPatience_s))
       << daemon->printed();
   daemon->signal(SIGTERM);
   ASSERT_TRUE(hears("STOPPING=1")) << daemon->printed();
@@ -71,7 +76,7 @@ TEST_P(Service, IsNotToldOfHealthThatItDidNotAskThisProcessFor) {
   setenv("WATCHDOG_PID", std::to_string(getpid()).c_str(), 1);
   const auto daemon = start("softarmd");
   ASSERT_TRUE(hears("READY=1")) << daemon->printed();
-  // Ten watchdog messages would have come meanwhile.
+  // Six watchdog messages would have come meanwhile.
   ASSERT_TRUE(wait_for([&] { return statuses_ > 500; })) << daemon->printed();
   daemon->signal(SIGTERM);
   ASSERT_TRUE(hears("STOPPING=1")) << daemon->printed();
