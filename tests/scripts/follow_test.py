@@ -6,23 +6,21 @@ import importlib.util
 import math
 import os
 import pathlib
-import signal
 import subprocess
 import sys
 import tempfile
 import time
 import unittest
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
+from running_arm import ROOT, own_url, skip_without_multicast, start, write_config
+
 EXAMPLE = ROOT / "docs/examples/follow.py"
 PYTHON = ROOT / "build/python/bin/python"
 
 if not PYTHON.exists():
     print("skipped: tools/python_environment was not run (it fetches the Python package lcm)")
     sys.exit(77)
-if subprocess.run([ROOT / "tools/with_loopback_network", "--check"], capture_output=True, check=False).returncode != 0:
-    print("skipped: no multicast route here (tools/with_loopback_network)")
-    sys.exit(77)
+skip_without_multicast()
 if pathlib.Path(sys.prefix) != PYTHON.parents[1]:
     subprocess.run([ROOT / "tools/python_environment"], check=True, capture_output=True)  # the types as they are now
     os.execv(PYTHON, [PYTHON, "-B", *sys.argv])
@@ -35,26 +33,12 @@ BEND_RAD = 0.3
 
 
 class Follow(unittest.TestCase):
-    def start(self, folder, *command):
-        output = open(folder / f"{pathlib.Path(command[0]).name}.txt", "w", encoding="utf-8")
-        self.addCleanup(output.close)
-        process = subprocess.Popen(command, stdout=output, stderr=output)
-
-        def end():
-            process.send_signal(signal.SIGTERM)
-            process.wait()
-
-        self.addCleanup(end)
-        return process
-
     def test_the_arm_really_goes_round(self):
         temporary = tempfile.TemporaryDirectory()
         self.addCleanup(temporary.cleanup)
         folder = pathlib.Path(temporary.name)
-        url = f"udpm://239.255.76.67:{20000 + os.getpid() % 40000}?ttl=0"
-        config = folder / "config.yaml"
-        config.write_text(f"include: {ROOT}/config/one_segment_live.yaml\nname: followed\n"
-                          f"daemon: {{lcm: {{url: \"{url}\"}}}}\n", encoding="utf-8")
+        url = own_url()
+        config = write_config(folder, "one_segment_live.yaml", url)
         bends = []
         node = lcm.LCM(url)
 
@@ -62,10 +46,10 @@ class Follow(unittest.TestCase):
             bends.append(plant_state_t.decode(data).u_rad[0])
 
         node.subscribe("SOFTARM_PLANT", take_plant)
-        self.start(folder, PROGRAMS / "softarm-plant", config)
-        self.start(folder, PROGRAMS / "softarmd", config)
-        example = self.start(folder, PYTHON, "-B", EXAMPLE, "--url", url, "--duration", "6", "--rate", "2",
-                             "--bend", str(BEND_RAD))
+        start(self, folder, PROGRAMS / "softarm-plant", config)
+        start(self, folder, PROGRAMS / "softarmd", config)
+        example = start(self, folder, PYTHON, "-B", EXAMPLE, "--url", url, "--duration", "6", "--rate", "2",
+                        "--bend", str(BEND_RAD))
         end = time.monotonic() + 60
         while example.poll() is None and time.monotonic() < end:
             node.handle_timeout(100)

@@ -4,13 +4,13 @@ import os
 import pathlib
 import re
 import shutil
-import signal
 import subprocess
 import sys
 import tempfile
 import unittest
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
+from running_arm import ROOT, own_url, skip_without_multicast, start, write_config
+
 PROGRAMS = pathlib.Path(sys.argv.pop(1))
 SEED = 4711
 JARS = [pathlib.Path("/usr/share/java") / name for name in ("lcm.jar", "jchart2d.jar", "xmlgraphics-commons.jar")]
@@ -23,9 +23,7 @@ missing += [str(jar) for jar in JARS if not jar.exists()]
 if missing:
     print(f"skipped: {', '.join(missing)} not here (tools/install_packages --spy)")
     sys.exit(77)
-if subprocess.run([ROOT / "tools/with_loopback_network", "--check"], capture_output=True, check=False).returncode != 0:
-    print("skipped: no multicast route here (tools/with_loopback_network)")
-    sys.exit(77)
+skip_without_multicast()
 
 
 def declared_fields(name):
@@ -41,28 +39,15 @@ class Spy(unittest.TestCase):
         cls.folder = pathlib.Path(temporary.name)
         for part in ("tools", "lcmtypes"):
             shutil.copytree(ROOT / part, cls.folder / part)
-        cls.url = f"udpm://239.255.76.67:{20000 + os.getpid() % 40000}?ttl=0"
+        cls.url = own_url()
 
     def spy(self, *arguments):
         return subprocess.run([self.folder / "tools/spy", *arguments], check=False, capture_output=True, text=True)
 
-    def start(self, program, config):
-        output = open(self.folder / f"{program}.txt", "w", encoding="utf-8")
-        self.addCleanup(output.close)
-        process = subprocess.Popen([PROGRAMS / program, config], stdout=output, stderr=output)
-
-        def end():
-            process.send_signal(signal.SIGTERM)
-            process.wait()
-
-        self.addCleanup(end)
-
     def test_every_field_of_the_status_is_shown_decoded(self):
-        config = self.folder / "config.yaml"
-        config.write_text(f"include: {ROOT}/config/paper_arm.yaml\nname: spied_on\nseed: {SEED}\n"
-                          f"daemon: {{lcm: {{url: \"{self.url}\"}}}}\n", encoding="utf-8")
-        self.start("softarm-plant", config)
-        self.start("softarmd", config)
+        config = write_config(self.folder, "paper_arm.yaml", self.url, f"seed: {SEED}\n")
+        start(self, self.folder, PROGRAMS / "softarm-plant", config)
+        start(self, self.folder, PROGRAMS / "softarmd", config)
         picture = self.folder / "spy.png"
         result = self.spy("--url", self.url, "--screenshot", picture)
         self.assertEqual(result.returncode, 0, result.stderr)

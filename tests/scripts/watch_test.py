@@ -3,42 +3,26 @@ import os
 import pathlib
 import pty
 import re
-import signal
 import subprocess
 import sys
 import tempfile
 import unittest
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
+from running_arm import ROOT, own_url, skip_without_multicast, start, write_config
+
 PROGRAMS = pathlib.Path(sys.argv.pop(1))
 
-if subprocess.run([ROOT / "tools/with_loopback_network", "--check"], capture_output=True, check=False).returncode != 0:
-    print("skipped: no multicast route here (tools/with_loopback_network)")
-    sys.exit(77)
+skip_without_multicast()
 
 
 class Watch(unittest.TestCase):
-    def start(self, folder, program, config):
-        output = open(folder / f"{program}.txt", "w", encoding="utf-8")
-        self.addCleanup(output.close)
-        process = subprocess.Popen([PROGRAMS / program, config], stdout=output, stderr=output)
-
-        def end():
-            process.send_signal(signal.SIGTERM)
-            process.wait()
-
-        self.addCleanup(end)
-
     def test_mode_rates_errors_pressures_and_counters_are_live(self):
         temporary = tempfile.TemporaryDirectory()
         self.addCleanup(temporary.cleanup)
         folder = pathlib.Path(temporary.name)
-        config = folder / "config.yaml"
-        url = f"udpm://239.255.76.67:{20000 + os.getpid() % 40000}?ttl=0"
-        config.write_text(f"include: {ROOT}/config/paper_arm.yaml\nname: watched\n"
-                          f"daemon: {{lcm: {{url: \"{url}\"}}}}\n", encoding="utf-8")
-        self.start(folder, "softarm-plant", config)
-        self.start(folder, "softarmd", config)
+        config = write_config(folder, "paper_arm.yaml", own_url())
+        start(self, folder, PROGRAMS / "softarm-plant", config)
+        start(self, folder, PROGRAMS / "softarmd", config)
         terminal, other_end = pty.openpty()
         self.addCleanup(os.close, terminal)
         watch = subprocess.Popen([PROGRAMS / "softarm", "watch", config, "--duration", "3"], stderr=other_end,
