@@ -121,6 +121,31 @@ TEST_P(MessagesAndLimits, ReferencesOutOfReachAndThroughTheStraightPoseStayBound
   for (const Station* station : stations) expect_limits(*station);
 }
 
+// The paper's A (15) is singular at theta = pi: a soft arm is led there.
+TEST_P(MessagesAndLimits, TheSingularPoseOfTheCouplesStaysBounded) {
+  configure(*this, "", "",
+            "arm: {actuation_model: couple, stiffness_nm_per_rad: 0.3}\n"
+            "control: {max_theta_rad: 3.3}\n"
+            "reference:\n"
+            "  - kind: way_points\n    repeat: true\n    points:\n"
+            "      - {time_s: 0, theta_rad: 0}\n      - {time_s: 2, theta_rad: 3.1}\n"
+            "      - {time_s: 4, theta_rad: 0}\n");
+  const auto plant = start_plant(*this);
+  const auto daemon = start("softarmd");
+  using Request = softarm_messages::operator_command_t;
+  Request arm{.sequence = 0, .request = Request::ARM};
+  const auto bounded = [&] {
+    // A busy machine may drive the arm beyond its soft limit first.
+    if (reason() == Reason::waiting_for_arm && ++arm.sequence % 10 == 0)
+      node_->publish("SOFTARM_OPERATOR", arm);
+    return (flags_seen_ & kBounded) != 0;
+  };
+  EXPECT_TRUE(wait_for(bounded, 30.0)) << told() << daemon->printed();
+  const int commands = commands_;
+  EXPECT_TRUE(wait_for([&] { return commands_ > commands + 200; })) << daemon->printed();
+  expect_limits(*this);
+}
+
 SOFTARM_ON_BOTH_MACHINES(MessagesAndLimits);
 
 }  // namespace

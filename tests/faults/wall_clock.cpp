@@ -1,0 +1,59 @@
+// A library to be loaded before all others (LD_PRELOAD): the wall clock is set while a program
+// runs, for that program alone. The monotonic clock is left as it is.
+#include <fcntl.h>
+#include <sys/mman.h>
+#include <sys/syscall.h>
+#include <sys/time.h>
+#include <time.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <cstdint>
+#include <cstdlib>
+
+namespace {
+
+struct Shared {
+  std::atomic<std::int64_t> offset_s;  ///< written by the test
+  std::atomic<std::int64_t> reads;     ///< of the wall clock, written here
+};
+
+/// The file that SOFTARM_WALL_CLOCK names, two 64-bit integers.
+Shared* shared() {
+  static Shared* const memory = [] {
+    const char* path = std::getenv("SOFTARM_WALL_CLOCK");
+    const int file = path != nullptr ? open(path, O_RDWR) : -1;
+    if (file < 0) std::abort();
+    void* const mapped = mmap(nullptr, sizeof(Shared), PROT_READ | PROT_WRITE, MAP_SHARED, file, 0);
+    if (mapped == MAP_FAILED) std::abort();
+    return static_cast<Shared*>(mapped);
+  }();
+  return memory;
+}
+
+std::int64_t offset_s() {
+  shared()->reads.fetch_add(1);
+  return shared()->offset_s.load();
+}
+
+}  // namespace
+
+extern "C" int clock_gettime(clockid_t clock, timespec* time) noexcept {
+  const auto result = static_cast<int>(syscall(SYS_clock_gettime, clock, time));
+  if (result == 0 && (clock == CLOCK_REALTIME || clock == CLOCK_REALTIME_COARSE))
+    time->tv_sec += offset_s();
+  return result;
+}
+
+extern "C" int gettimeofday(timeval* time, void* zone) noexcept {
+  const auto result = static_cast<int>(syscall(SYS_gettimeofday, time, zone));
+  if (result == 0) time->tv_sec += offset_s();
+  return result;
+}
+
+extern "C" time_t time(time_t* out) noexcept {
+  timespec now{};
+  clock_gettime(CLOCK_REALTIME, &now);
+  if (out != nullptr) *out = now.tv_sec;
+  return now.tv_sec;
+}
