@@ -1,0 +1,115 @@
+"""softarm identify --live against the simulated arm: it plays only within its limits, and vents. Argument: folder of the programs."""
+import pathlib
+import shutil
+import signal
+import struct
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+
+from running_arm import own_url, skip_without_multicast, start, write_config
+
+PROGRAMS = pathlib.Path(sys.argv.pop(1))
+PATIENCE_S = 120
+BUSY = "no frame with every segment for"  # on a machine too busy for the simulated arm
+
+skip_without_multicast()
+if shutil.which("lcm-logger") is None:
+    print("skipped: lcm-logger is not installed (tools/install_packages)")
+    sys.exit(77)
+
+
+def commands(log):
+    """Time in s and pressures in bar of every command in a log of lcm-logger."""
+    data, at, found = log.read_bytes(), 0, []
+    while at + 28 <= len(data):
+        sync, _, _, channel, size = struct.unpack_from(">IqqII", data, at)
+        assert sync == 0xEDA1DA01
+        at += 28 + channel
+        _, _, time_us, _, shadow, count = struct.unpack_from(">qqqibh", data, at)
+        assert shadow == 0
+        found.append((1e-6 * time_us, struct.unpack_from(f">{count}f", data, at + 31)))
+        at += size
+    return found
+
+
+class IdentifyLive(unittest.TestCase):
+    def setUp(self):
+        temporary = tempfile.TemporaryDirectory()
+        self.addCleanup(temporary.cleanup)
+        self.folder = pathlib.Path(temporary.name)
+
+    def play(self, limits, meanwhile=None, arm=True):
+        """What `identify` prints, its exit code, and what it commanded. MEANWHILE gets it and the arm after the first step."""
+        url = own_url()
+        config = write_config(self.folder, "one_segment.yaml", url, f"identification: {{steps_bar: [0.4], hold_s: 20, {limits}}}\n")
+        log, written = self.folder / "commands.log", self.folder / "identified.yaml"
+        log.unlink(missing_ok=True)
+        plant = start(self, self.folder, PROGRAMS / "softarm-plant", config) if arm else None
+        logger = subprocess.Popen(["lcm-logger", "--quiet", "--lcm-url", url, "--channel", "SOFTARM_PRESSURE_COMMAND", log],
+                                  stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        told = self.folder / "told.txt"
+        with open(told, "w", encoding="utf-8") as file:
+            identify = subprocess.Popen([PROGRAMS / "softarm", "identify", config, "--live", "--output", written], stdout=file,
+                                        stderr=file)
+            try:
+                if meanwhile:
+                    end = time.monotonic() + PATIENCE_S
+                    while "step 1 of" not in told.read_text(encoding="utf-8") and time.monotonic() < end:
+                        time.sleep(0.01)
+                    meanwhile(identify, plant)
+                code = identify.wait(timeout=PATIENCE_S)
+            finally:
+                identify.kill()
+                logger.terminate()
+                logger.wait()
+                if plant:
+                    plant.kill()
+                    plant.wait()
+        self.assertFalse(written.exists())
+        return code, told.read_text(encoding="utf-8"), commands(log)
+
+    def expect_vented(self, why, limits, meanwhile=None):
+        for _ in range(5):
+            code, told, sent = self.play(limits, meanwhile)
+            if BUSY not in told:
+                break
+        self.assertEqual(code, 1, told)
+        self.assertRegex(told, "vented, nothing identified: " + why)
+        pushed = [k for k, (_, bar) in enumerate(sent) if any(bar)]
+        self.assertTrue(pushed, told)
+        self.assertAlmostEqual(max(max(bar) for _, bar in sent), 0.4, delta=1e-6)
+        after = [time_s for time_s, _ in sent[pushed[-1] + 1:]]
+        self.assertGreater(after[-1] - after[0], 0.9)  # zero for a second, as the page says
+
+    def test_a_bend_beyond_the_limit_vents(self):
+        self.expect_vented(r"a segment bends by 0\.\d+ rad, beyond identification\.max_theta_rad of 0\.05 rad",
+                           "max_theta_rad: 0.05")
+
+    def test_a_speed_beyond_the_limit_vents(self):
+        self.expect_vented(r"a segment moves at [\d.]+ rad/s, beyond identification\.max_speed_radps of 0\.2 rad/s",
+                           "max_speed_radps: 0.2")
+
+    def test_an_interrupt_vents(self):
+        self.expect_vented("stopped", "max_theta_rad: 3", lambda identify, _: identify.send_signal(signal.SIGINT))
+
+    def test_an_arm_that_is_not_seen_any_more_is_vented(self):
+        code, told, sent = self.play("max_theta_rad: 3", lambda _, plant: plant.send_signal(signal.SIGSTOP))
+        self.assertEqual(code, 1, told)
+        self.assertIn("vented, nothing identified: no frame with every segment for 200 ms", told)
+        self.assertFalse(any(sent[-1][1]))
+        self.assertTrue(any(any(bar) for _, bar in sent))
+
+    def test_without_frames_nothing_is_inflated(self):
+        code, told, sent = self.play("max_theta_rad: 3", arm=False)
+        self.assertEqual(code, 1, told)
+        self.assertIn("no frame with every segment on", told)
+        self.assertIn("is motion capture running", told)
+        self.assertTrue(sent)
+        self.assertFalse(any(any(bar) for _, bar in sent))
+
+
+if __name__ == "__main__":
+    unittest.main()
