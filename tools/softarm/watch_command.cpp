@@ -162,6 +162,17 @@ int watch(const WatchOptions& options) {
       record.close();
       return kExitFailure;
     }
+    if (options.duration_s > 0.0 && record.rows() > 0 &&
+        static_cast<Mode>(record.status().mode) == Mode::fault) {
+      print_error(
+          "softarm",
+          fmt::format("the arm is in FAULT ({}) after {:.1f} of {:.1f} s of ACTIVE: mend what is "
+                      "wrong, `softarm disarm` and `softarm arm`, then watch again",
+                      name(static_cast<Reason>(record.status().reason)), record.active_s(),
+                      options.duration_s));
+      record.close();
+      return kExitFailure;
+    }
     if (record.rows() > 0 && view.due()) view.draw(record);
     if (record.rows() > 0 && isatty(STDERR_FILENO) == 0 && progress.due())
       progress.update(progress_text(record, options.duration_s));

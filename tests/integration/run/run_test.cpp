@@ -120,6 +120,8 @@ TEST_F(Run, WrongCommandLinesExitWith64) {
   for (const auto& arguments : wrong) EXPECT_EQ(start("softarm", arguments), 64) << printed;
   for (const char* program : {"softarmd", "softarm-plant"}) {
     EXPECT_EQ(start(program, {}), 64) << printed;
+    EXPECT_EQ(start(program, {"--no-such-option"}), 64) << printed;
+    EXPECT_NE(printed.find("--no-such-option"), std::string::npos) << printed;
     EXPECT_EQ(start(program, {kPaperArm, "--no-such-option"}), 64) << printed;
   }
 }
