@@ -6,7 +6,6 @@
 
 #include "lock_step.hpp"
 #include "softarm/daemon/realtime.hpp"
-#include "softarm/transport/message_decoding.hpp"
 
 namespace softarm {
 namespace {
@@ -16,8 +15,7 @@ constexpr std::int64_t kLatestTime_us = 4'000'000'000'000'000;  // nanoseconds m
 LoggedRun::LoggedRun(const Experiment& experiment, const std::filesystem::path& log)
     : experiment_(experiment),
       pipeline_(experiment),
-      adapter_(experiment.daemon.bodies, experiment.arm),
-      clock_(experiment.daemon.capture_time, experiment.daemon.safety.frame_latency_s),
+      mocap_(experiment.daemon, experiment.arm),
       file_(log, std::ios::binary),
       log_(file_) {
   if (!file_)
@@ -26,24 +24,23 @@ LoggedRun::LoggedRun(const Experiment& experiment, const std::filesystem::path& 
   if (!read_frame())
     throw std::runtime_error(fmt::format(
         "{} holds no frame on channel {}; daemon.lcm.mocap_channel says which to look for",
-        log.string(), experiment.daemon.lcm.mocap_channel));
+        log.string(), mocap_.channels().front()));
   start_ns_ = next_arrival_ns_;
 }
 
 bool LoggedRun::read_frame() {
-  softarm_messages::mocap_frame_t message;
   for (LogEvent event; log_.next(event);) {
-    if (event.channel != experiment_.daemon.lcm.mocap_channel) continue;
-    const bool has_time = event.time_us >= 0 && event.time_us < kLatestTime_us;
-    if (!has_time || !decode(event.data, message)) {
+    const auto channel = mocap_.find(event.channel);
+    if (!channel) continue;
+    if (event.time_us < 0 || event.time_us >= kLatestTime_us) {
       ++malformed_;
       continue;
     }
     // A log written from several sources may step back a little; time here does not.
     next_arrival_ns_ = std::max(next_arrival_ns_, event.time_us * 1000);
-    adapter_.to_frame(message, next_);
-    next_.capture_ns = clock_.capture_ns(next_arrival_ns_, message.capture_time_us);
-    return has_next_ = true;
+    const MocapReceipt receipt = mocap_.take(*channel, event.data, next_arrival_ns_, next_);
+    if (receipt == MocapReceipt::malformed) ++malformed_;
+    if (receipt == MocapReceipt::frame) return has_next_ = true;
   }
   return has_next_ = false;
 }

@@ -11,9 +11,8 @@
 #include "softarm/config/experiment.hpp"
 #include "softarm/daemon/control_pipeline.hpp"
 #include "softarm/daemon/histogram.hpp"
-#include "softarm/estimation/clock_relation.hpp"
 #include "softarm/transport/event_log.hpp"
-#include "softarm/transport/mocap_adapter.hpp"
+#include "softarm/transport/mocap_source.hpp"
 
 namespace softarm {
 
@@ -42,8 +41,7 @@ class LoggedRun {
 
   Experiment experiment_;
   ControlPipeline pipeline_;
-  MocapAdapter adapter_;
-  ClockRelation clock_;
+  MocapSource mocap_;
   std::ifstream file_;
   EventLogReader log_;
   std::vector<MocapFrame> frames_;

@@ -103,6 +103,9 @@ int make(const Options& options) {
     send_packets(lcm.url, {flooding_frame(lcm)}, options.for_s, 0);
     return kExitOk;
   }
+  if (experiment.daemon.mocap.source != MocapSourceKind::softarm)
+    throw ConfigError(options.config, 0, "daemon.mocap.source",
+                      "softarm, the only frames that this program can spoil", "another source");
   Fault fault = options.fault == "none" ? Fault{} : *find_fault(options.fault);
   fault.body = options.body;
   if (options.has_amount) fault.amount = options.amount;

@@ -16,7 +16,7 @@
 #include "softarm/plant/simulated_arm.hpp"
 #include "softarm/transport/lcm_node.hpp"
 #include "softarm/transport/message_decoding.hpp"
-#include "softarm/transport/mocap_adapter.hpp"
+#include "softarm/transport/mocap_source.hpp"
 #include "softarm/valves/simulated_terminal.hpp"
 
 namespace softarm {
@@ -36,7 +36,7 @@ class PlantProcess {
  public:
   PlantProcess(const Experiment& experiment, std::optional<int> modbus_port)
       : lcm_(experiment.daemon.lcm),
-        adapter_(experiment.daemon.bodies, experiment.plant.arm),
+        mocap_(experiment.daemon, experiment.plant.arm),
         node_(lcm_.url),
         arm_(experiment.plant, monotonic_now_ns()),
         by_torque_(experiment.plant.actuation.kind == ActuationKind::torque),
@@ -62,8 +62,7 @@ class PlantProcess {
       modbus_ ? serve_requests(deadline_ns) : take_commands(deadline_ns);
       advance();
       for (MocapFrame frame; arm_.receive(frame);) {
-        adapter_.to_message(frame, (frame.capture_ns + lost_ns_) / 1000, frame_message_);
-        node_.publish(lcm_.mocap_channel, frame_message_);
+        mocap_.publish(node_, frame, (frame.capture_ns + lost_ns_) / 1000);
       }
       if (arm_.time_ns() >= next_report_ns) {
         publish_state();
@@ -170,7 +169,7 @@ class PlantProcess {
   }
 
   LcmSettings lcm_;
-  MocapAdapter adapter_;
+  MocapSender mocap_;
   LcmNode node_;
   SimulatedArm arm_;
   std::unique_ptr<ModbusSide> modbus_;
@@ -179,7 +178,6 @@ class PlantProcess {
   std::int64_t lost_ns_ = 0;
   bool command_received_ = false;
   std::vector<double> pressure_bar_;
-  softarm_messages::mocap_frame_t frame_message_;
   softarm_messages::pressure_command_t command_message_;
   softarm_messages::torque_command_t torque_message_;
   softarm_messages::pressure_measurement_t measurement_message_;

@@ -30,8 +30,9 @@ class Checks {
       : experiment_(experiment), reader_(reader) {}
 
   void run() const {
-    check_arm("arm", experiment_.arm);
-    check_arm("plant.arm", experiment_.plant.arm);
+    check_rotation("arm.base.rotation", experiment_.arm.base_rotation);
+    check_rotation("plant.arm.base.rotation", experiment_.plant.arm.base_rotation);
+    check_rotation("daemon.mocap.axes", experiment_.daemon.mocap.axes);
     check_radius("arm", experiment_.arm, false);
     check_radius("plant.arm", experiment_.plant.arm, experiment_.plant.kind == PlantKind::links);
     check_actuation("actuation", experiment_.actuation);
@@ -51,13 +52,12 @@ class Checks {
     if (!holds) throw reader_.error_at(key, expected, got);
   }
 
-  void check_arm(const std::string& key, const ArmParameters& arm) const {
-    const Eigen::Matrix3d& r = arm.base_rotation;
+  void check_rotation(const std::string& key, const Eigen::Matrix3d& r) const {
     const double deviation =
         (r.transpose() * r - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
     const double determinant = r.determinant();
     require(
-        deviation < kRotationTolerance && determinant > 0.0, key + ".base.rotation",
+        deviation < kRotationTolerance && determinant > 0.0, key,
         "a rotation: orthonormal, determinant +1",
         fmt::format("R'R off the identity by {:.2g}, determinant {:.6g}", deviation, determinant));
   }
@@ -179,6 +179,32 @@ class Checks {
             "a body that is no segment's end", fmt::format("{}", bodies.base_id));
   }
 
+  /// Letters, digits and a few signs: names need no quoting in LCM's regular expressions, nor by
+  /// people.
+  void check_word(const std::string& key, const std::string& name) const {
+    const bool word = std::all_of(name.begin(), name.end(), [](char c) {
+      return std::isalnum(static_cast<unsigned char>(c)) || std::strchr("_-./", c) != nullptr;
+    });
+    require(word, key, "letters, digits, _ - . /", "\"" + name + "\"");
+  }
+
+  /// Where every body has a channel of its own.
+  void check_body_channels(std::set<std::string>& seen) const {
+    const DaemonSettings& daemon = experiment_.daemon;
+    if (daemon.mocap.source != MocapSourceKind::rigid_transform) return;
+    const auto check = [&](const std::string& key, const PlateSettings& plate) {
+      check_word(key, plate.name);
+      const std::string channel = body_channel(daemon.lcm, plate);
+      require(channel.size() <= 63, key, "a channel of at most 63 characters", channel);
+      require(seen.insert(channel).second, key, "a channel of its own",
+              "\"" + channel + "\", which another key names too");
+    };
+    if (daemon.bodies.base_id >= 0)
+      check("daemon.bodies.base_plate.name", daemon.bodies.base_plate);
+    for (const PlateSettings& plate : daemon.bodies.segment_plates)
+      check("daemon.bodies.segment_plates", plate);
+  }
+
   void check_safety() const {
     const SafetySettings& safety = experiment_.daemon.safety;
     require(safety.hold_after_s == 0.0 || safety.vent_after_s == 0.0 ||
@@ -221,14 +247,11 @@ class Checks {
     std::set<std::string> seen;
     for (const auto& [key, name] : channels) {
       if (name.empty()) continue;  // what may be left out
-      const bool word = std::all_of(name.begin(), name.end(), [](char c) {
-        return std::isalnum(static_cast<unsigned char>(c)) || std::strchr("_-./", c) != nullptr;
-      });
-      require(word, fmt::format("daemon.lcm.{}", key), "letters, digits, _ - . /",
-              "\"" + name + "\"");
+      check_word(fmt::format("daemon.lcm.{}", key), name);
       require(seen.insert(name).second, fmt::format("daemon.lcm.{}", key), "a channel of its own",
               "\"" + name + "\", which another key names too");
     }
+    check_body_channels(seen);
     require(lcm.url.find("://") != std::string::npos, "daemon.lcm.url",
             "an LCM provider, such as udpm://239.255.76.67:7667?ttl=0", "\"" + lcm.url + "\"");
   }

@@ -1,7 +1,9 @@
 // The description of references, the daemon and the simulated arm.
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <numeric>
+#include <string>
 
 #include "config/schema.hpp"
 
@@ -170,7 +172,10 @@ void describe_lcm(SchemaVisitor& visitor, LcmSettings& lcm) {
   visitor.text(
       {"url", "", "LCM provider; the time to live keeps messages on this machine", from_to(1, 200)},
       lcm.url);
-  channel("mocap_channel", "motion-capture frames", lcm.mocap_channel);
+  channel("mocap_channel",
+          "motion-capture frames; left out: OPTITRACK_FRAMES for optitrack, VICON for "
+          "rigid_transform, where it is what the bodies' channels begin with",
+          lcm.mocap_channel);
   channel("command_channel", "pressure commands", lcm.command_channel);
   channel("measurement_channel", "measured pressures", lcm.measurement_channel);
   channel("reference_channel", "live references", lcm.reference_channel);
@@ -200,7 +205,49 @@ void describe_realtime(SchemaVisitor& visitor, RealtimeSettings& realtime) {
   visitor.flag({"lock_memory", "", "mlockall"}, realtime.lock_memory);
 }
 
-void describe_bodies(SchemaVisitor& visitor, BodySettings& bodies, int segments) {
+void describe_mocap(SchemaVisitor& visitor, DaemonSettings& daemon) {
+  static const std::array<const char*, 3> kSources = {"softarm", "optitrack", "rigid_transform"};
+  static const std::array<const char*, 2> kUnits = {"m", "mm"};
+  static const std::array<const char*, 2> kOrders = {"xyzw", "wxyz"};
+  static const std::array<const char*, 2> kAxes = {"z_up", "y_up"};
+  static const std::array<Eigen::Matrix3d, 2> kRotations = {
+      Eigen::Matrix3d::Identity(),
+      (Eigen::Matrix3d() << 1.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 1.0, 0.0).finished()};
+  MocapSourceSettings& mocap = daemon.mocap;
+  visitor.choice({"source", "",
+                  "softarm: mocap_frame_t; optitrack: optitrack_frame_t; rigid_transform: "
+                  "rigid_transform_t (Vicon), one channel a body"},
+                 kSources, mocap.source);
+  if (visitor.reading()) {
+    const auto kind = mocap.source;
+    const bool optitrack = kind == MocapSourceKind::optitrack;
+    mocap.quaternion = optitrack ? QuaternionOrder::xyzw : QuaternionOrder::wxyz;
+    if (optitrack) daemon.lcm.mocap_channel = "OPTITRACK_FRAMES";
+    if (kind == MocapSourceKind::rigid_transform) daemon.lcm.mocap_channel = "VICON";
+  }
+  visitor.choice({"unit", "", "of the positions sent"}, kUnits, mocap.unit);
+  visitor.choice({"quaternion", "", "order sent; left out: xyzw for optitrack, wxyz otherwise"},
+                 kOrders, mocap.quaternion);
+  visitor.matrix_or_word({"axes", "",
+                          "of the sender's world: z_up; y_up (x, -z, y become our x, y, z); or the "
+                          "rotation from it to ours, a 3 x 3 matrix",
+                          from_to(-1.0, 1.0)},
+                         kAxes, kRotations, mocap.axes);
+}
+
+void describe_plate(SchemaVisitor& visitor, PlateSettings& plate, bool named) {
+  if (named)
+    visitor.text(
+        {"name", "", "of the body; its channel is lcm.mocap_channel, _, name", from_to(1, 40)},
+        plate.name);
+  visitor.vector3({"position_m", "m", "of S_i in the body's own frame", from_to(-10.0, 10.0)},
+                  plate.position_m);
+  visitor.vector3({"rotation_rad", "rad", "rotation vector of S_i in the body's own frame",
+                   from_to(-kTwoPi, kTwoPi)},
+                  plate.rotation_rad);
+}
+
+void describe_bodies(SchemaVisitor& visitor, BodySettings& bodies, int segments, bool named) {
   std::int64_t base = bodies.base_id;
   visitor.integer_or_word(
       {"base_id", "", "body of the base, or fixed: arm.base holds", from_to(0, 2147483647.0)},
@@ -210,9 +257,28 @@ void describe_bodies(SchemaVisitor& visitor, BodySettings& bodies, int segments)
     bodies.segment_ids.resize(static_cast<std::size_t>(segments));
     std::iota(bodies.segment_ids.begin(), bodies.segment_ids.end(), 1);
   }
-  visitor.integers(
-      {"segment_ids", "", "bodies of the segments' ends, base to tip", from_to(0, 2147483647.0)},
-      segments, bodies.segment_ids);
+  visitor.integers({"segment_ids", "",
+                    "bodies of the segments' ends, base to tip (rigid_transform: names instead)",
+                    from_to(0, 2147483647.0)},
+                   segments, bodies.segment_ids);
+  if (bodies.segment_plates.empty()) {
+    bodies.segment_plates.resize(static_cast<std::size_t>(segments));
+    if (named) {
+      bodies.base_plate.name = "base";
+      for (std::size_t i = 0; i < bodies.segment_plates.size(); ++i)
+        bodies.segment_plates[i].name = "segment_" + std::to_string(i + 1);
+    }
+  }
+  auto& plates = bodies.segment_plates;
+  visitor.section({"base_plate", "", "S_0 on the body of the base; softarm calibrate"},
+                  SectionKind::plain, [&] { describe_plate(visitor, bodies.base_plate, named); });
+  const bool all_equal = std::all_of(plates.begin(), plates.end(),
+                                     [&](const auto& other) { return other == plates.front(); });
+  visitor.shared_or_list(
+      {"segment_plates", "",
+       "S_i on the bodies of the segments' ends, of all or a list; softarm calibrate finds them"},
+      segments, all_equal,
+      [&](int i) { describe_plate(visitor, plates[static_cast<std::size_t>(i)], named); });
 }
 
 }  // namespace
@@ -270,8 +336,12 @@ void describe_daemon(SchemaVisitor& visitor, DaemonSettings& daemon, int segment
                  kCaptureTimes, daemon.capture_time);
   visitor.section({"safety", "", "thresholds of the safety monitor"}, SectionKind::plain,
                   [&] { describe_safety(visitor, daemon.safety); });
+  visitor.section({"mocap", "", "who sends motion-capture frames, and what the numbers mean"},
+                  SectionKind::plain, [&] { describe_mocap(visitor, daemon); });
+  const bool named = daemon.mocap.source == MocapSourceKind::rigid_transform;
   visitor.section({"bodies", "", "which bodies of a frame carry the base and the segments' ends"},
-                  SectionKind::plain, [&] { describe_bodies(visitor, daemon.bodies, segments); });
+                  SectionKind::plain,
+                  [&] { describe_bodies(visitor, daemon.bodies, segments, named); });
   visitor.section({"realtime", "", "the daemon's place on the machine"}, SectionKind::plain,
                   [&] { describe_realtime(visitor, daemon.realtime); });
   visitor.section({"lcm", "", "channels, distinct where two arms share a machine"},

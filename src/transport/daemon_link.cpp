@@ -13,7 +13,6 @@ namespace {
 /// What may arrive between two ticks; more is dropped by LCM and counted as missing.
 constexpr int kFrameCapacity = TickRecorder::kMostFrames;
 constexpr int kOtherCapacity = 16;
-constexpr int kMessagesPerTick = kFrameCapacity + 4 * kOtherCapacity;
 constexpr auto kNever = std::numeric_limits<std::int64_t>::min();
 /// After so long a silence a sender of references or requests may begin its numbers anew.
 constexpr std::int64_t kNumberForgotten_ns = 500'000'000;
@@ -28,8 +27,7 @@ std::int64_t wall_clock_ns() noexcept {
 
 DaemonLink::DaemonLink(const PipelineSettings& settings, const Provenance& provenance, bool shadow)
     : settings_(settings.daemon),
-      adapter_(settings.daemon.bodies, settings.arm),
-      clock_(settings.daemon.capture_time, settings.daemon.safety.frame_latency_s),
+      mocap_(settings.daemon, settings.arm),
       node_(settings.daemon.lcm.url),
       dof_(settings.arm.dof()),
       messages_(settings, provenance, shadow),
@@ -42,15 +40,15 @@ DaemonLink::DaemonLink(const PipelineSettings& settings, const Provenance& prove
   frames_.resize(static_cast<std::size_t>(
       recorder_ ? std::min(kFrameCapacity, recorder_->frame_capacity()) : kFrameCapacity));
   // Everything that grows is grown here, so that the loop never has to.
-  frame_message_.bodies.reserve(4 * static_cast<std::size_t>(kMaxBodies));
   for (auto* list : {&reference_message_.u_rad, &reference_message_.velocity_radps,
                      &reference_message_.acceleration_radps2})
     list->reserve(2 * kMaxSegments);
   measurement_message_.pressure_bar.reserve(kMaxChambers);
   measured_bar_.setZero(std::ssize(messages_.pressure_command.pressure_bar));
 
-  node_.subscribe(settings_.lcm.mocap_channel, kFrameCapacity,
-                  [this](const auto& packet) { take_frame(packet); });
+  for (std::size_t k = 0; k < mocap_.channels().size(); ++k)
+    node_.subscribe(mocap_.channels()[k], kFrameCapacity,
+                    [this, k](const auto& packet) { take_frame(k, packet); });
   node_.subscribe(settings_.lcm.reference_channel, kOtherCapacity,
                   [this](const auto& packet) { take_reference(packet); });
   node_.subscribe(settings_.lcm.operator_channel, kOtherCapacity,
@@ -70,7 +68,9 @@ TickInput DaemonLink::collect(std::int64_t now_ns) noexcept {
   frame_count_ = 0;
   input_ = {};
   input_.now_ns = now_ns;
-  node_.drain(kMessagesPerTick);
+  node_.drain(static_cast<int>(mocap_.channels().size()) * kFrameCapacity + 4 * kOtherCapacity);
+  if (frame_count_ < frames_.size() && mocap_.overdue(now_ns, frames_[frame_count_]))
+    ++frame_count_;
   input_.frames = {frames_.data(), frame_count_};
   input_.newest_measurement_ns = newest_measurement_ns_;
   input_.newest_go_ns = newest_go_ns_;
@@ -84,15 +84,12 @@ std::int64_t DaemonLink::arrival_ns(const ReceivedMessage& packet) const noexcep
   return std::clamp(arrival, previous_collect_ns_, now_ns_);
 }
 
-void DaemonLink::take_frame(const ReceivedMessage& packet) noexcept {
-  if (!decode(packet.bytes, frame_message_)) {
-    ++malformed_;
-    return;
-  }
+void DaemonLink::take_frame(std::size_t channel, const ReceivedMessage& packet) noexcept {
   if (frame_count_ == frames_.size()) return;
-  MocapFrame& frame = frames_[frame_count_++];
-  adapter_.to_frame(frame_message_, frame);
-  frame.capture_ns = clock_.capture_ns(arrival_ns(packet), frame_message_.capture_time_us);
+  const MocapReceipt receipt =
+      mocap_.take(channel, packet.bytes, arrival_ns(packet), frames_[frame_count_]);
+  if (receipt == MocapReceipt::malformed) ++malformed_;
+  if (receipt == MocapReceipt::frame) ++frame_count_;
 }
 
 void DaemonLink::take_reference(const ReceivedMessage& packet) noexcept {

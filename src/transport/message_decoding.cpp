@@ -141,4 +141,9 @@ bool decode(std::span<const std::byte> bytes, softarm_messages::deadman_t& messa
   return decode_exactly(bytes, kHash + 8 + 1, message);
 }
 
+bool decode(std::span<const std::byte> bytes,
+            softarm_messages::rigid_transform_t& message) noexcept {
+  return decode_exactly(bytes, kHash + 8 + 7 * 8, message);
+}
+
 }  // namespace softarm

@@ -8,11 +8,10 @@
 #include <stdexcept>
 
 #include "softarm/daemon/realtime.hpp"
-#include "softarm/estimation/clock_relation.hpp"
 #include "softarm/estimation/curvature_estimator.hpp"
 #include "softarm/transport/lcm_node.hpp"
 #include "softarm/transport/message_decoding.hpp"
-#include "softarm/transport/mocap_adapter.hpp"
+#include "softarm/transport/mocap_source.hpp"
 
 namespace softarm {
 namespace {
@@ -31,16 +30,16 @@ class LiveExperiment {
                  const std::function<void(const std::string&)>& progress)
       : experiment_(experiment),
         lock_(experiment.daemon.lcm.command_channel + " on " + experiment.daemon.lcm.url),
-        adapter_(experiment.daemon.bodies, experiment.arm),
-        clock_(experiment.daemon.capture_time, experiment.daemon.safety.frame_latency_s),
+        mocap_(experiment.daemon, experiment.arm),
         estimator_(experiment.estimation, experiment.arm,
                    body_noise(experiment.estimation, experiment.arm.size(),
                               experiment.daemon.bodies.base_id < 0)),
         node_(experiment.daemon.lcm.url),
         stop_(stop),
         progress_(progress) {
-    node_.subscribe(experiment.daemon.lcm.mocap_channel, 1024,
-                    [this](const ReceivedMessage& packet) { take_frame(packet); });
+    for (std::size_t k = 0; k < mocap_.channels().size(); ++k)
+      node_.subscribe(mocap_.channels()[k], 1024,
+                      [this, k](const ReceivedMessage& packet) { take_frame(k, packet); });
   }
 
   LiveOutcome run(const std::vector<std::vector<double>>& steps, double hold_s) {
@@ -74,7 +73,7 @@ class LiveExperiment {
       throw std::runtime_error(fmt::format(
           "no frame with every segment on {} for {} s: is motion capture running, and do "
           "daemon.bodies name its bodies?",
-          experiment_.daemon.lcm.mocap_channel, kPatience_ns / kSecond_ns));
+          mocap_.channels().front(), kPatience_ns / kSecond_ns));
     if (!still())
       throw std::runtime_error(
           "the arm moves before the first step: expected it at rest; is "
@@ -154,18 +153,16 @@ class LiveExperiment {
   };
 
   // Called from LCM: nothing may be thrown through it. Storage grows, which is all it can fail at.
-  void take_frame(const ReceivedMessage& packet) {
-    if (!decode(packet.bytes, frame_message_)) return;
-    if (frame_message_.frame_number == last_number_) return;
-    last_number_ = frame_message_.frame_number;
-    adapter_.to_frame(frame_message_, frame_);
+  void take_frame(std::size_t channel, const ReceivedMessage& packet) {
     const std::int64_t now_ns = monotonic_now_ns();
-    const std::int64_t capture_ns = clock_.capture_ns(now_ns, frame_message_.capture_time_us);
+    if (mocap_.take(channel, packet.bytes, now_ns, frame_) != MocapReceipt::frame) return;
+    if (frame_.frame_number == last_number_) return;
+    last_number_ = frame_.frame_number;
     estimator_.estimate(frame_, estimate_);
     if (!std::all_of(estimate_.valid.begin(), estimate_.valid.begin() + experiment_.arm.size(),
                      [](bool each) { return each; }))
       return;
-    const double time_s = 1e-9 * static_cast<double>(capture_ns);
+    const double time_s = 1e-9 * static_cast<double>(frame_.capture_ns);
     if (!recent_.empty() && time_s <= recent_.back().time_s) return;
     last_frame_ns_ = now_ns;
     recent_.push_back({time_s, estimate_.u_rad});
@@ -203,8 +200,7 @@ class LiveExperiment {
 
   const Experiment& experiment_;
   InstanceLock lock_;
-  MocapAdapter adapter_;
-  ClockRelation clock_;
+  MocapSource mocap_;
   CurvatureEstimator estimator_;
   LcmNode node_;
   const std::function<bool()>& stop_;
@@ -217,7 +213,6 @@ class LiveExperiment {
   std::int64_t last_number_ = INT64_MIN;
   MocapFrame frame_;
   CurvatureEstimate estimate_;
-  softarm_messages::mocap_frame_t frame_message_;
   softarm_messages::pressure_command_t message_;
 };
 

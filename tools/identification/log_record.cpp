@@ -7,10 +7,9 @@
 #include <stdexcept>
 #include <vector>
 
-#include "softarm/estimation/clock_relation.hpp"
 #include "softarm/estimation/curvature_estimator.hpp"
 #include "softarm/transport/message_decoding.hpp"
-#include "softarm/transport/mocap_adapter.hpp"
+#include "softarm/transport/mocap_source.hpp"
 
 namespace softarm {
 namespace {
@@ -46,8 +45,7 @@ class LogReader {
   LogReader(const Experiment& experiment, LoggedInput input)
       : experiment_(experiment),
         input_(input),
-        adapter_(experiment.daemon.bodies, experiment.arm),
-        clock_(experiment.daemon.capture_time, experiment.daemon.safety.frame_latency_s),
+        mocap_(experiment.daemon, experiment.arm),
         estimator_(experiment.estimation, experiment.arm,
                    body_noise(experiment.estimation, experiment.arm.size(),
                               experiment.daemon.bodies.base_id < 0)) {
@@ -58,8 +56,8 @@ class LogReader {
     const LcmSettings& lcm = experiment_.daemon.lcm;
     const std::span bytes(static_cast<const std::byte*>(event.data),
                           static_cast<std::size_t>(event.datalen));
-    if (event.channel == lcm.mocap_channel && decode(bytes, frame_message_))
-      take_frame(event.timestamp);
+    if (const auto channel = mocap_.find(event.channel))
+      take_frame(*channel, bytes, event.timestamp);
     if (input_ == LoggedInput::commanded && event.channel == lcm.command_channel &&
         decode(bytes, command_message_))
       take_pressures(event.timestamp, command_message_.pressure_bar);
@@ -74,7 +72,7 @@ class LogReader {
       throw std::runtime_error(
           fmt::format("{}: expected at least {} frames with every segment on {}, got {}; "
                       "daemon.lcm.mocap_channel and daemon.bodies say where to look",
-                      path, kFewest, lcm.mocap_channel, frames_.time_s.size()));
+                      path, kFewest, mocap_.channels().front(), frames_.time_s.size()));
     if (inputs_.time_s.size() < 2)
       throw std::runtime_error(fmt::format(
           "{}: expected pressures of {} chambers on {}, got {} such messages and {} of another "
@@ -97,18 +95,17 @@ class LogReader {
     return 1e-6 * static_cast<double>(time_us - start_us_);
   }
 
-  void take_frame(std::int64_t arrival_us) {
-    if (frame_message_.frame_number == last_frame_) return;
-    last_frame_ = frame_message_.frame_number;
+  void take_frame(std::size_t channel, std::span<const std::byte> bytes, std::int64_t arrival_us) {
     arrival_ns_ = std::max(arrival_ns_, arrival_us * 1000);
-    adapter_.to_frame(frame_message_, frame_);
-    const std::int64_t capture_ns = clock_.capture_ns(arrival_ns_, frame_message_.capture_time_us);
+    if (mocap_.take(channel, bytes, arrival_ns_, frame_) != MocapReceipt::frame) return;
+    if (frame_.frame_number == last_frame_) return;
+    last_frame_ = frame_.frame_number;
     estimator_.estimate(frame_, estimate_);
     if (!std::all_of(estimate_.valid.begin(), estimate_.valid.begin() + experiment_.arm.size(),
                      [](bool each) { return each; }))
       return;
     const Eigen::VectorXd u = estimate_.u_rad;
-    frames_.add(time_s(capture_ns / 1000), u.data(), static_cast<std::size_t>(u.size()));
+    frames_.add(time_s(frame_.capture_ns / 1000), u.data(), static_cast<std::size_t>(u.size()));
   }
 
   void take_pressures(std::int64_t arrival_us, const std::vector<float>& pressures) {
@@ -122,8 +119,7 @@ class LogReader {
 
   const Experiment& experiment_;
   LoggedInput input_;
-  MocapAdapter adapter_;
-  ClockRelation clock_;
+  MocapSource mocap_;
   CurvatureEstimator estimator_;
   std::size_t chambers_ = 0;
   Samples frames_, inputs_;
@@ -132,7 +128,6 @@ class LogReader {
   std::int64_t wrong_size_ = 0;
   MocapFrame frame_;
   CurvatureEstimate estimate_;
-  softarm_messages::mocap_frame_t frame_message_;
   softarm_messages::pressure_command_t command_message_;
   softarm_messages::pressure_measurement_t measurement_message_;
 };

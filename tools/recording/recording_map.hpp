@@ -9,12 +9,12 @@
 #include <vector>
 
 #include "recording/csv_table.hpp"
+#include "softarm/daemon/settings.hpp"
 
 namespace softarm {
 
 /// Which axis of the recording's world points up. Ours is z.
 enum class UpAxis { x, y, z };
-enum class QuaternionOrder { xyzw, wxyz };
 
 /// Where the pose of one rigid body stands; indices of columns.
 struct BodyColumns {

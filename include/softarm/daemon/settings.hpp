@@ -2,6 +2,7 @@
 // machine.
 #pragma once
 
+#include <Eigen/Core>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -66,10 +67,45 @@ struct LcmSettings {
   double command_validity_s = 0.1;              ///< after which the valve side vents by itself
 };
 
+/// Who sends frames, and in which messages.
+enum class MocapSourceKind {
+  softarm,         ///< mocap_frame_t
+  optitrack,       ///< optitrack_frame_t
+  rigid_transform  ///< rigid_transform_t, one channel a body: lcm.mocap_channel, _, its name
+};
+enum class QuaternionOrder { xyzw, wxyz };
+enum class LengthUnit { metre, millimetre };
+
+/// What a frame's numbers mean.
+struct MocapSourceSettings {
+  MocapSourceKind source = MocapSourceKind::softarm;
+  LengthUnit unit = LengthUnit::metre;
+  QuaternionOrder quaternion = QuaternionOrder::wxyz;
+  /// p_world = axes * p_sent: from the sender's world to ours, whose z axis points up.
+  Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();
+};
+
+/// A marker plate: where on it the frame S_i sits that the arm is made of.
+struct PlateSettings {
+  std::string name;  ///< of the body, where bodies have names instead of ids
+  Eigen::Vector3d position_m = Eigen::Vector3d::Zero();  ///< of S_i in the body's own frame
+  /// Rotation vector of S_i in the body's own frame: R_world_S = R_world_body exp(rotation^).
+  Eigen::Vector3d rotation_rad = Eigen::Vector3d::Zero();
+
+  bool operator==(const PlateSettings&) const = default;
+};
+
+/// The channel of a body that has one of its own.
+inline std::string body_channel(const LcmSettings& lcm, const PlateSettings& plate) {
+  return lcm.mocap_channel + "_" + plate.name;
+}
+
 /// Which bodies of the motion-capture frame carry the base and the segment ends.
 struct BodySettings {
-  int base_id = 0;               ///< -1: the base is fixed by arm.base
-  std::vector<int> segment_ids;  ///< n ids, from the base to the tip
+  int base_id = 0;                                 ///< -1: the base is fixed by arm.base
+  std::vector<int> segment_ids;                    ///< n ids, from the base to the tip
+  PlateSettings base_plate = {};                   ///< not looked at where the base is fixed
+  std::vector<PlateSettings> segment_plates = {};  ///< n, or none: S_i are the bodies' own frames
 };
 
 /// Rate, safety and connections of softarmd.
@@ -81,6 +117,7 @@ struct DaemonSettings {
   /// declared latency of either way.
   ClockMode capture_time = ClockMode::sender;
   LcmSettings lcm;
+  MocapSourceSettings mocap;
   BodySettings bodies;
 };
 

@@ -5,7 +5,6 @@
 #include <optional>
 #include <softarm_messages/curvature_reference_t.hpp>
 #include <softarm_messages/deadman_t.hpp>
-#include <softarm_messages/mocap_frame_t.hpp>
 #include <softarm_messages/operator_command_t.hpp>
 #include <softarm_messages/pressure_measurement_t.hpp>
 #include <softarm_messages/timing_t.hpp>
@@ -13,9 +12,8 @@
 
 #include "softarm/daemon/control_pipeline.hpp"
 #include "softarm/daemon/histogram.hpp"
-#include "softarm/estimation/clock_relation.hpp"
 #include "softarm/transport/lcm_node.hpp"
-#include "softarm/transport/mocap_adapter.hpp"
+#include "softarm/transport/mocap_source.hpp"
 #include "softarm/transport/output_messages.hpp"
 #include "softarm/transport/tick_record.hpp"
 
@@ -58,7 +56,7 @@ class DaemonLink {
   std::int64_t unsent() const noexcept { return unsent_; }
 
  private:
-  void take_frame(const ReceivedMessage& packet) noexcept;
+  void take_frame(std::size_t channel, const ReceivedMessage& packet) noexcept;
   void take_reference(const ReceivedMessage& packet) noexcept;
   void take_operator(const ReceivedMessage& packet) noexcept;
   void take_measurement(const ReceivedMessage& packet) noexcept;
@@ -66,8 +64,7 @@ class DaemonLink {
   std::int64_t arrival_ns(const ReceivedMessage& packet) const noexcept;
 
   DaemonSettings settings_;
-  MocapAdapter adapter_;
-  ClockRelation clock_;
+  MocapSource mocap_;
   LcmNode node_;
   int dof_;
   OutputMessages messages_;
@@ -93,7 +90,6 @@ class DaemonLink {
   std::int64_t malformed_ = 0;
   std::int64_t unsent_ = 0;
 
-  softarm_messages::mocap_frame_t frame_message_;
   softarm_messages::curvature_reference_t reference_message_;
   softarm_messages::operator_command_t operator_message_;
   softarm_messages::pressure_measurement_t measurement_message_;

@@ -11,6 +11,7 @@
 #include <softarm_messages/plant_state_t.hpp>
 #include <softarm_messages/pressure_command_t.hpp>
 #include <softarm_messages/pressure_measurement_t.hpp>
+#include <softarm_messages/rigid_transform_t.hpp>
 #include <softarm_messages/tick_record_t.hpp>
 #include <softarm_messages/timing_t.hpp>
 #include <softarm_messages/torque_command_t.hpp>
@@ -39,5 +40,7 @@ bool decode(std::span<const std::byte> bytes, softarm_messages::timing_t& messag
 bool decode(std::span<const std::byte> bytes, softarm_messages::tick_record_t& message) noexcept;
 bool decode(std::span<const std::byte> bytes, softarm_messages::valves_status_t& message) noexcept;
 bool decode(std::span<const std::byte> bytes, softarm_messages::deadman_t& message) noexcept;
+bool decode(std::span<const std::byte> bytes,
+            softarm_messages::rigid_transform_t& message) noexcept;
 
 }  // namespace softarm

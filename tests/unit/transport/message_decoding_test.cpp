@@ -73,7 +73,7 @@ class MessageDecoding : public ::testing::Test {
 using AllMessages =
     ::testing::Types<mocap_frame_t, pressure_command_t, pressure_measurement_t,
                      curvature_reference_t, operator_command_t, controller_status_t, plant_state_t,
-                     timing_t, tick_record_t, valves_status_t, deadman_t>;
+                     timing_t, tick_record_t, valves_status_t, deadman_t, rigid_transform_t>;
 class MessageName {
  public:
   template <class Message>

@@ -56,6 +56,15 @@ inline softarm_messages::mocap_frame_t example(int segments, int /*chambers*/) {
 }
 
 template <>
+inline softarm_messages::rigid_transform_t example(int segments, int chambers) {
+  softarm_messages::rigid_transform_t message;
+  message.utime = 1'000'000 + segments;
+  for (int k = 0; k < 3; ++k) message.trans[k] = 0.1 * k + chambers;
+  for (int k = 0; k < 4; ++k) message.quat[k] = 0.5 - k;
+  return message;
+}
+
+template <>
 inline softarm_messages::pressure_command_t example(int segments, int chambers) {
   return {.sequence = 42,
           .time_us = 43,

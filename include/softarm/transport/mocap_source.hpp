@@ -1,0 +1,84 @@
+// The one door through which motion capture comes in, whoever sends it: packets -> frames. And the
+// other way round, for a simulated arm.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "softarm/estimation/clock_relation.hpp"
+#include "softarm/transport/frame_assembler.hpp"
+#include "softarm/transport/lcm_node.hpp"
+#include "softarm/transport/mocap_adapter.hpp"
+
+namespace softarm {
+
+/// What became of a packet.
+enum class MocapReceipt {
+  frame,     ///< it completed a frame
+  nothing,   ///< more has to come, or it was late or a repetition
+  malformed  ///< not one message of the type of the source
+};
+
+/// Channels that carry motion capture: one, or one a body (base first, where it is not fixed).
+std::vector<std::string> mocap_channels(const DaemonSettings& daemon);
+
+/// Turns what arrives on `channels()` into frames, capture times included. Belongs to one thread;
+/// after construction it neither allocates nor throws.
+class MocapSource {
+ public:
+  MocapSource(const DaemonSettings& daemon, const ArmParameters& arm);
+
+  /// To subscribe to; their places in this list are what `take` wants.
+  const std::vector<std::string>& channels() const noexcept { return channels_; }
+  /// Place of a channel in that list, for who reads a log; empty for any other.
+  std::optional<std::size_t> find(std::string_view channel) const noexcept;
+
+  /// @param arrival_ns on our monotonic clock, not decreasing from call to call
+  /// @param frame written where the answer is `frame`; unspecified otherwise
+  MocapReceipt take(std::size_t channel, std::span<const std::byte> bytes, std::int64_t arrival_ns,
+                    MocapFrame& frame) noexcept;
+
+  /// A frame that waits for a body in vain: true, and the frame, once it has waited long enough.
+  /// For sources with a channel a body, once a tick; others never have one.
+  bool overdue(std::int64_t now_ns, MocapFrame& frame) noexcept;
+
+  /// Sender's clock at the capture of the newest frame, in us.
+  std::int64_t sender_time_us() const noexcept { return sender_time_us_; }
+
+ private:
+  MocapReceipt take_body(std::size_t channel, std::span<const std::byte> bytes,
+                         std::int64_t arrival_ns, MocapFrame& frame) noexcept;
+
+  MocapSourceKind kind_;
+  MocapAdapter adapter_;
+  ClockRelation clock_;
+  std::vector<std::string> channels_;
+  FrameAssembler assembler_;
+  std::int64_t sender_time_us_ = 0;
+  softarm_messages::mocap_frame_t message_;
+  std::unique_ptr<OptitrackFrame> optitrack_;
+};
+
+/// Publishes frames in the configured source's messages.
+class MocapSender {
+ public:
+  MocapSender(const DaemonSettings& daemon, const ArmParameters& arm);
+
+  /// @param sender_time_us of exposure, on any clock; also stands for the wall clock in utime
+  void publish(LcmNode& node, const MocapFrame& frame, std::int64_t sender_time_us);
+
+ private:
+  MocapSourceKind kind_;
+  MocapAdapter adapter_;
+  std::vector<std::string> channels_;
+  softarm_messages::mocap_frame_t message_;
+  softarm_messages::optitrack_frame_t optitrack_;
+};
+
+}  // namespace softarm

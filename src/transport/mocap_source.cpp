@@ -1,0 +1,113 @@
+#include "softarm/transport/mocap_source.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "softarm/transport/message_decoding.hpp"
+
+namespace softarm {
+namespace {
+
+constexpr std::int64_t kLatestStamp_us = 4'000'000'000'000'000;  // nanoseconds must not overflow
+
+/// Beyond what a clock relation takes, where it is nonsense.
+std::int64_t to_us(double time_s) noexcept {
+  const double time_us = 1e6 * time_s;
+  return std::abs(time_us) <= static_cast<double>(kLatestStamp_us) ? std::llround(time_us)
+                                                                   : kLatestStamp_us + 1;
+}
+
+}  // namespace
+
+std::vector<std::string> mocap_channels(const DaemonSettings& daemon) {
+  if (daemon.mocap.source != MocapSourceKind::rigid_transform) return {daemon.lcm.mocap_channel};
+  std::vector<std::string> channels;
+  if (daemon.bodies.base_id >= 0)
+    channels.push_back(body_channel(daemon.lcm, daemon.bodies.base_plate));
+  for (const PlateSettings& plate : daemon.bodies.segment_plates)
+    channels.push_back(body_channel(daemon.lcm, plate));
+  return channels;
+}
+
+MocapSource::MocapSource(const DaemonSettings& daemon, const ArmParameters& arm)
+    : kind_(daemon.mocap.source),
+      adapter_(daemon.bodies, arm, daemon.mocap),
+      clock_(daemon.capture_time, daemon.safety.frame_latency_s),
+      channels_(mocap_channels(daemon)),
+      assembler_(static_cast<int>(daemon.bodies.segment_ids.size()), adapter_.base_is_fixed(),
+                 daemon.safety.frame_period_s) {
+  message_.bodies.reserve(4 * static_cast<std::size_t>(kMaxBodies));
+  if (kind_ == MocapSourceKind::optitrack) optitrack_ = std::make_unique<OptitrackFrame>();
+}
+
+std::optional<std::size_t> MocapSource::find(std::string_view channel) const noexcept {
+  const auto at = std::find(channels_.begin(), channels_.end(), channel);
+  if (at == channels_.end()) return std::nullopt;
+  return static_cast<std::size_t>(at - channels_.begin());
+}
+
+MocapReceipt MocapSource::take(std::size_t channel, std::span<const std::byte> bytes,
+                               std::int64_t arrival_ns, MocapFrame& frame) noexcept {
+  if (kind_ == MocapSourceKind::rigid_transform)
+    return take_body(channel, bytes, arrival_ns, frame);
+  if (kind_ == MocapSourceKind::optitrack) {
+    if (!decode(bytes, *optitrack_)) return MocapReceipt::malformed;
+    adapter_.to_frame(*optitrack_, frame);
+    sender_time_us_ = to_us(optitrack_->timestamp_s);
+  } else {
+    if (!decode(bytes, message_)) return MocapReceipt::malformed;
+    adapter_.to_frame(message_, frame);
+    sender_time_us_ = message_.capture_time_us;
+  }
+  frame.capture_ns = clock_.capture_ns(arrival_ns, sender_time_us_);
+  return MocapReceipt::frame;
+}
+
+MocapReceipt MocapSource::take_body(std::size_t channel, std::span<const std::byte> bytes,
+                                    std::int64_t arrival_ns, MocapFrame& frame) noexcept {
+  softarm_messages::rigid_transform_t message;
+  if (channel >= channels_.size() || !decode(bytes, message) || message.utime > kLatestStamp_us ||
+      message.utime < -kLatestStamp_us)
+    return MocapReceipt::malformed;
+  const std::size_t body = channel + (adapter_.base_is_fixed() ? 1 : 0);
+  const auto outcome =
+      assembler_.add(body, adapter_.to_pose(message, body), message.utime, arrival_ns);
+  if (outcome == FrameAssembler::Outcome::begun)
+    assembler_.set_capture_ns(clock_.capture_ns(arrival_ns, message.utime));
+  adapter_.clear(frame);
+  if (!assembler_.take_done(frame)) return MocapReceipt::nothing;
+  sender_time_us_ = message.utime;
+  return MocapReceipt::frame;
+}
+
+bool MocapSource::overdue(std::int64_t now_ns, MocapFrame& frame) noexcept {
+  if (kind_ != MocapSourceKind::rigid_transform) return false;
+  assembler_.look_at_clock(now_ns);
+  adapter_.clear(frame);
+  return assembler_.take_done(frame);
+}
+
+MocapSender::MocapSender(const DaemonSettings& daemon, const ArmParameters& arm)
+    : kind_(daemon.mocap.source),
+      adapter_(daemon.bodies, arm, daemon.mocap),
+      channels_(mocap_channels(daemon)) {}
+
+void MocapSender::publish(LcmNode& node, const MocapFrame& frame, std::int64_t sender_time_us) {
+  if (kind_ == MocapSourceKind::softarm) {
+    adapter_.to_message(frame, sender_time_us, message_);
+    node.publish(channels_.front(), message_);
+  } else if (kind_ == MocapSourceKind::optitrack) {
+    adapter_.to_message(frame, sender_time_us, optitrack_);
+    node.publish(channels_.front(), optitrack_);
+  } else {
+    const std::size_t first = adapter_.base_is_fixed() ? 1 : 0;
+    for (std::size_t k = 0; k < channels_.size(); ++k) {
+      if (!frame.body[first + k].valid) continue;
+      softarm_messages::rigid_transform_t message;
+      adapter_.to_message(frame.body[first + k], first + k, sender_time_us, message);
+      node.publish(channels_[k], message);
+    }
+  }
+}
+
+}  // namespace softarm

@@ -1,0 +1,121 @@
+#include "softarm/transport/optitrack_frame.hpp"
+
+#include <bit>
+#include <softarm_messages/optitrack_frame_t.hpp>
+#include <type_traits>
+
+namespace softarm {
+namespace {
+
+/// Walks big-endian numbers. Once something did not fit, all that follows is zero and `ok` false.
+class Cursor {
+ public:
+  explicit Cursor(std::span<const std::byte> bytes) : left_(bytes) {}
+
+  bool ok() const { return ok_; }
+  bool at_end() const { return ok_ && left_.empty(); }
+
+  void skip(std::size_t size) {
+    if (size > left_.size()) {
+      ok_ = false;
+      left_ = {};
+      return;
+    }
+    left_ = left_.subspan(size);
+  }
+
+  template <class Number>
+  Number take() {
+    using Bits =
+        std::conditional_t<sizeof(Number) == 8, std::uint64_t,
+                           std::conditional_t<sizeof(Number) == 4, std::uint32_t, std::uint16_t>>;
+    const auto from = left_;
+    skip(sizeof(Number));
+    if (!ok_) return Number{};
+    Bits bits = 0;
+    for (std::size_t k = 0; k < sizeof(Number); ++k)
+      bits = static_cast<Bits>(bits << 8 | std::to_integer<Bits>(from[k]));
+    return std::bit_cast<Number>(bits);
+  }
+
+  /// A number of elements of at least `element` bytes each: no more than can still come.
+  std::size_t count(std::size_t element) {
+    const auto size = take<std::int32_t>();
+    if (size < 0 || static_cast<std::size_t>(size) > left_.size() / element) ok_ = false;
+    if (ok_) return static_cast<std::size_t>(size);
+    left_ = {};
+    return 0;
+  }
+
+  void skip_list(std::size_t element) { skip(element * count(element)); }
+
+  /// Length, which counts the terminating zero, and characters.
+  void skip_text() {
+    const std::size_t length = count(1);
+    if (length == 0 || left_.size() < length || left_[length - 1] != std::byte{0}) ok_ = false;
+    skip(length);
+  }
+
+ private:
+  std::span<const std::byte> left_;
+  bool ok_ = true;
+};
+
+constexpr std::size_t kPoint = 3 * 4;
+constexpr std::size_t kLeastMarkerSet = 4 + 1 + 4;
+constexpr std::size_t kLeastRigidBody = 4 + kPoint + 4 * 4 + 4 + 4 + 2;
+constexpr std::size_t kMarkerOfBody = kPoint + 4 + 4;
+constexpr std::size_t kLeastSkeleton = 4 + 4;
+constexpr std::size_t kMarker = 4 + kPoint + 4 + 2;
+constexpr std::size_t kForceplate = 4 + 2 * kPoint;
+
+OptitrackBody take_body(Cursor& cursor) {
+  OptitrackBody body;
+  body.id = cursor.take<std::int32_t>();
+  for (float& each : body.position) each = cursor.take<float>();
+  for (float& each : body.orientation) each = cursor.take<float>();
+  cursor.skip_list(kMarkerOfBody);  // three lists of one length
+  cursor.skip(4);                   // mean_error
+  body.tracked = (cursor.take<std::uint16_t>() & 1U) != 0;
+  return body;
+}
+
+void skip_marker_sets(Cursor& cursor) {
+  const std::size_t sets = cursor.count(kLeastMarkerSet);
+  for (std::size_t i = 0; i < sets && cursor.ok(); ++i) {
+    cursor.skip_text();
+    cursor.skip_list(kPoint);
+  }
+}
+
+void skip_skeletons(Cursor& cursor) {
+  const std::size_t skeletons = cursor.count(kLeastSkeleton);
+  for (std::size_t i = 0; i < skeletons && cursor.ok(); ++i) {
+    cursor.skip(4);
+    const std::size_t bodies = cursor.count(kLeastRigidBody);
+    for (std::size_t j = 0; j < bodies && cursor.ok(); ++j) take_body(cursor);
+  }
+}
+
+}  // namespace
+
+bool decode(std::span<const std::byte> bytes, OptitrackFrame& frame) noexcept {
+  Cursor cursor(bytes);
+  if (cursor.take<std::int64_t>() != softarm_messages::optitrack_frame_t::getHash()) return false;
+  frame.utime_us = cursor.take<std::int64_t>();
+  frame.frame_number = cursor.take<std::int32_t>();
+  skip_marker_sets(cursor);
+  cursor.skip_list(kPoint);  // markers of no body
+  frame.bodies = cursor.count(kLeastRigidBody);
+  if (frame.bodies > OptitrackFrame::kMostBodies) return false;
+  for (std::size_t i = 0; i < frame.bodies && cursor.ok(); ++i) frame.body[i] = take_body(cursor);
+  skip_skeletons(cursor);
+  cursor.skip_list(kMarker);
+  cursor.skip_list(kForceplate);
+  cursor.skip(4 + 8 + 8);  // latency and timecode
+  frame.timestamp_s = cursor.take<double>();
+  cursor.skip(2);  // params
+  return cursor.at_end();
+}
+
+}  // namespace softarm

@@ -1,0 +1,105 @@
+// Who sends motion capture, and what the numbers mean.
+#include <gtest/gtest.h>
+
+#include "config_files.hpp"
+#include "softarm/config/load.hpp"
+
+namespace softarm {
+namespace {
+
+class MocapKeys : public ::testing::Test {
+ protected:
+  /// kGoodExperiment with `more` in its daemon section.
+  Experiment load(const std::string& more) const {
+    std::string text = kGoodExperiment;
+    text.replace(text.find("  bodies:"), 0, more);
+    return load_experiment(folder.write("e.yaml", text));
+  }
+  std::string complaint(const std::string& more) const {
+    try {
+      load(more);
+    } catch (const ConfigError& error) {
+      return error.what();
+    }
+    return "";
+  }
+  static std::string with_bodies(const std::string& bodies) {
+    std::string text = kGoodExperiment;
+    const std::string old = "    base_id: 0\n    segment_ids: [1, 2]\n";
+    text.replace(text.find(old), old.size(), bodies);
+    return text;
+  }
+  TestFolder folder;
+};
+
+TEST_F(MocapKeys, LeftOutMeanOurOwnFrames) {
+  const DaemonSettings daemon = load("").daemon;
+  EXPECT_EQ(daemon.mocap.source, MocapSourceKind::softarm);
+  EXPECT_EQ(daemon.mocap.unit, LengthUnit::metre);
+  EXPECT_EQ(daemon.mocap.quaternion, QuaternionOrder::wxyz);
+  EXPECT_EQ(daemon.mocap.axes, Eigen::Matrix3d::Identity());
+  EXPECT_EQ(daemon.lcm.mocap_channel, "SOFTARM_MOCAP");
+  ASSERT_EQ(daemon.bodies.segment_plates.size(), 2U);
+  EXPECT_EQ(daemon.bodies.segment_plates[1], PlateSettings{});
+}
+
+TEST_F(MocapKeys, ASourceBringsItsDefaults) {
+  DaemonSettings daemon = load("  mocap: {source: optitrack}\n").daemon;
+  EXPECT_EQ(daemon.lcm.mocap_channel, "OPTITRACK_FRAMES");
+  EXPECT_EQ(daemon.mocap.quaternion, QuaternionOrder::xyzw);
+  daemon = load("  mocap: {source: rigid_transform}\n").daemon;
+  EXPECT_EQ(daemon.mocap.quaternion, QuaternionOrder::wxyz);
+  EXPECT_EQ(body_channel(daemon.lcm, daemon.bodies.base_plate), "VICON_base");
+  EXPECT_EQ(body_channel(daemon.lcm, daemon.bodies.segment_plates[1]), "VICON_segment_2");
+}
+
+TEST_F(MocapKeys, EverythingCanBeSaidAndSurvivesPrinting) {
+  std::string text = with_bodies(
+      "    base_plate: {name: root, position_m: [0, 0.01, 0]}\n"
+      "    segment_plates:\n"
+      "      - {name: a, rotation_rad: [0, 0, pi]}\n"
+      "      - {name: b, position_m: [1e-3, 2e-3, 3e-3]}\n");
+  text.replace(text.find("  bodies:"), 0,
+               "  mocap: {source: rigid_transform, unit: mm, quaternion: xyzw, axes: y_up}\n");
+  const Experiment first = load_experiment(folder.write("e.yaml", text));
+  const Experiment again = load_experiment(folder.write("f.yaml", resolved_text(first)));
+  EXPECT_EQ(resolved_text(first), resolved_text(again));
+  for (const Experiment& experiment : {first, again}) {
+    const DaemonSettings& daemon = experiment.daemon;
+    EXPECT_EQ(daemon.mocap.unit, LengthUnit::millimetre);
+    EXPECT_EQ(daemon.mocap.quaternion, QuaternionOrder::xyzw);
+    // What is up there is up here.
+    EXPECT_EQ(daemon.mocap.axes * Eigen::Vector3d::UnitY(), Eigen::Vector3d::UnitZ());
+    EXPECT_EQ(daemon.mocap.axes * Eigen::Vector3d::UnitX(), Eigen::Vector3d::UnitX());
+    EXPECT_EQ(daemon.bodies.base_plate.name, "root");
+    EXPECT_EQ(daemon.bodies.base_plate.position_m, Eigen::Vector3d(0, 0.01, 0));
+    EXPECT_EQ(daemon.bodies.segment_plates[0].rotation_rad.z(), 3.141592653589793);
+    EXPECT_EQ(daemon.bodies.segment_plates[1].position_m, Eigen::Vector3d(1e-3, 2e-3, 3e-3));
+  }
+}
+
+TEST_F(MocapKeys, MistakesAreTold) {
+  EXPECT_NE(complaint("  mocap: {source: vicon}\n").find("softarm, optitrack, rigid_transform"),
+            std::string::npos);
+  EXPECT_NE(complaint("  mocap: {unit: cm}\n").find("one of m, mm"), std::string::npos);
+  // A mirror: left-handed axes are no rotation of right-handed ones.
+  const std::string mirror = complaint("  mocap: {axes: [[1, 0, 0], [0, 1, 0], [0, 0, -1]]}\n");
+  EXPECT_NE(mirror.find("daemon.mocap.axes"), std::string::npos) << mirror;
+  EXPECT_NE(mirror.find("determinant -1"), std::string::npos) << mirror;
+}
+
+TEST_F(MocapKeys, EveryBodyHasAChannelOfItsOwn) {
+  std::string text = with_bodies("    segment_plates: [{name: a}, {name: a}]\n");
+  text.replace(text.find("  bodies:"), 0, "  mocap: {source: rigid_transform}\n");
+  try {
+    load_experiment(folder.write("e.yaml", text));
+    FAIL() << "two bodies of one name";
+  } catch (const ConfigError& error) {
+    EXPECT_NE(std::string(error.what()).find("VICON_a"), std::string::npos) << error.what();
+  }
+  text.replace(text.find("{name: a}, {name: a}"), 20, "{name: a}, {name: b c}");
+  EXPECT_THROW(load_experiment(folder.write("e.yaml", text)), ConfigError);
+}
+
+}  // namespace
+}  // namespace softarm
