@@ -50,6 +50,10 @@ constexpr std::array kFaults{
                      "FAULT (valves_silent) with valve_readback"},
     FaultDescription{"burst", FaultKind::burst, "a chamber shows no pressure", "", 0.0,
                      "FAULT (pressure_mismatch) with valve_readback"},
+    FaultDescription{"mirror", FaultKind::mirror, "y of all positions is reversed", "", 0.0,
+                     "none at rest; softarm check --live --pulse sees it"},
+    FaultDescription{"leak", FaultKind::leak, "a chamber shows less pressure than it has",
+                     "which part less", 0.4, "FAULT beyond pressure_tolerance_bar"},
 };
 
 Eigen::Vector3d position(const mocap_body_t& body) {
@@ -126,6 +130,8 @@ void FaultInjector::spoil_poses(mocap_frame_t& frame) {
     std::swap(frame.bodies[static_cast<std::size_t>(which)].id,
               frame.bodies[static_cast<std::size_t>((which + 1) % size)].id);
   if (fault_.kind == FaultKind::jump && taken_ % 2 == 0) bend_to_other_side(frame);
+  if (fault_.kind == FaultKind::mirror)
+    for (mocap_body_t& body : frame.bodies) body.position_m[1] *= -1.0;
   if (fault_.kind == FaultKind::freeze) {
     if (!kept_) kept_ = frame;
     frame.bodies = kept_->bodies;
@@ -170,10 +176,11 @@ std::int64_t FaultInjector::next_due_ns() const {
 bool FaultInjector::pass(softarm_messages::pressure_measurement_t& measurement) const {
   if (fault_.kind == FaultKind::silence) return false;
   auto& pressures = measurement.pressure_bar;
-  if (fault_.kind == FaultKind::burst && !pressures.empty()) {
-    const int last = static_cast<int>(pressures.size()) - 1;
-    pressures[static_cast<std::size_t>(std::clamp(fault_.body, 0, last))] = 0.0F;
-  }
+  if (pressures.empty()) return true;
+  float& chosen = pressures[static_cast<std::size_t>(
+      std::clamp(fault_.body, 0, static_cast<int>(pressures.size()) - 1))];
+  if (fault_.kind == FaultKind::burst) chosen = 0.0F;
+  if (fault_.kind == FaultKind::leak) chosen *= 1.0F - static_cast<float>(fault_.amount);
   return true;
 }
 

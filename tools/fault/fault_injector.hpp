@@ -31,7 +31,9 @@ enum class FaultKind {
   freeze,      ///< poses repeat, numbers and times go on
   clock,       ///< the sender's clock is set
   silence,     ///< no measured pressure goes through
-  burst        ///< chamber `body` shows no pressure
+  burst,       ///< chamber `body` shows no pressure
+  mirror,      ///< the world's y is reversed in positions alone
+  leak         ///< chamber `body` shows a part less pressure than it has
 };
 
 struct Fault {

@@ -15,7 +15,7 @@ void add_bench_control_commands(CLI::App& group);
 /// softarm bench plant [--json] [--duration S] [--rounds N]: added to `softarm bench`
 void add_bench_plant_command(CLI::App& group);
 
-/// softarm check CONFIG | --template
+/// softarm check CONFIG [--live [--pulse]] | --template
 void add_check_command(CLI::App& app);
 
 /// softarm eval FILE [--mass point|distributed] [--method direct|augmented]
@@ -26,6 +26,9 @@ void add_identify_command(CLI::App& app);
 
 /// softarm import CSV MAP.yaml --out LOG
 void add_import_command(CLI::App& app);
+
+/// softarm jog CONFIG SEGMENT CHAMBER PRESSURE
+void add_jog_command(CLI::App& app);
 
 /// softarm replay LOG CONFIG [--any-configuration] [--json]
 void add_replay_command(CLI::App& app);

@@ -128,8 +128,29 @@ TEST_F(Injector, SpoilsPressures) {
   injector.set(burst);
   EXPECT_TRUE(injector.pass(measured));
   EXPECT_EQ(measured.pressure_bar, (std::vector<float>{1.0F, 2.0F, 0.0F}));
+  Fault leak = *find_fault("leak");
+  leak.body = 1;
+  leak.amount = 0.25;
+  injector.set(leak);
+  EXPECT_TRUE(injector.pass(measured));
+  EXPECT_EQ(measured.pressure_bar, (std::vector<float>{1.0F, 1.5F, 0.0F}));
   injector.set(*find_fault("silence"));
   EXPECT_FALSE(injector.pass(measured));
+}
+
+TEST_F(Injector, MirrorsPositionsAlone) {
+  const softarm_messages::mocap_frame_t right = sent(1);
+  FaultInjector injector;
+  injector.set(*find_fault("mirror"));
+  injector.take(right, 0);
+  softarm_messages::mocap_frame_t frame;
+  ASSERT_TRUE(injector.next(0, frame));
+  for (std::size_t i = 0; i < right.bodies.size(); ++i) {
+    const auto& body = right.bodies[i];
+    for (int axis = 0; axis < 3; ++axis)
+      EXPECT_EQ(frame.bodies[i].position_m[axis], (axis == 1 ? -1.0 : 1.0) * body.position_m[axis]);
+    for (int k = 0; k < 4; ++k) EXPECT_EQ(frame.bodies[i].orientation[k], body.orientation[k]);
+  }
 }
 
 TEST(Faults, HaveNamesOfTheirOwn) {

@@ -1,0 +1,65 @@
+#include "live/commander.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace softarm {
+namespace {
+
+constexpr std::int64_t kPeriod_ns = 10'000'000;
+
+}  // namespace
+
+int chamber_count(const ActuationSettings& actuation) {
+  std::size_t count = 0;
+  for (const auto& chambers : actuation.segments) count += chambers.size();
+  return static_cast<int>(count);
+}
+
+Commander::Commander(const Experiment& experiment, LcmNode& node)
+    : lock_(experiment.daemon.lcm.command_channel + " on " + experiment.daemon.lcm.url),
+      node_(node),
+      experiment_(experiment),
+      vent_ramps_(experiment.actuation),
+      bar_(PressureVector::Zero(chamber_count(experiment.actuation))),
+      period_ns_(std::min(kPeriod_ns, static_cast<std::int64_t>(
+                                          2.5e8 * experiment.daemon.lcm.command_validity_s))) {
+  message_.validity_us =
+      static_cast<std::int32_t>(std::llround(1e6 * experiment.daemon.lcm.command_validity_s));
+  message_.shadow = 0;
+  message_.num_chambers = static_cast<std::int16_t>(bar_.size());
+  message_.sequence = 0;
+}
+
+void Commander::update(const PressureVector& wanted_bar, double rate_bar_per_s,
+                       std::int64_t now_ns) {
+  ActuationSettings limits = experiment_.actuation;
+  limits.segments.clear();
+  limits.slew_bar_per_s = std::min(limits.slew_bar_per_s, rate_bar_per_s);
+  PressureRamps(limits).limit(bar_, wanted_bar, step_s(now_ns), bar_);
+  send(now_ns);
+}
+
+void Commander::vent(std::int64_t now_ns) {
+  vent_ramps_.vent(bar_, step_s(now_ns), bar_);
+  send(now_ns);
+}
+
+// After a stall the ramp goes on where it was: no step makes up for it.
+double Commander::step_s(std::int64_t now_ns) {
+  const std::int64_t passed_ns = std::clamp<std::int64_t>(now_ns - updated_ns_, 0, period_ns_);
+  updated_ns_ = now_ns;
+  return 1e-9 * static_cast<double>(passed_ns);
+}
+
+void Commander::send(std::int64_t now_ns) {
+  if (now_ns < next_ns_) return;
+  next_ns_ = now_ns + period_ns_;
+  ++message_.sequence;
+  message_.time_us = now_ns / 1000;
+  message_.pressure_bar.assign(bar_.begin(), bar_.end());
+  if (!node_.publish(experiment_.daemon.lcm.command_channel, message_))
+    throw TransportError("a command could not be sent: see tools/with_loopback_network --check");
+}
+
+}  // namespace softarm

@@ -1,0 +1,48 @@
+// The only commander of an arm, while a tool plays pressures on it.
+#pragma once
+
+#include <cstdint>
+#include <softarm_messages/pressure_command_t.hpp>
+
+#include "softarm/actuation/pressure_ramps.hpp"
+#include "softarm/config/experiment.hpp"
+#include "softarm/daemon/realtime.hpp"
+#include "softarm/transport/lcm_node.hpp"
+
+namespace softarm {
+
+/// Sends set points, 100 a second, within the configured limits of pressure and slew. Holds the
+/// daemon's own lock on the command channel: neither runs beside the other. Whoever holds the
+/// valves vents by itself when we fall silent (daemon.lcm.command_validity_s).
+class Commander {
+ public:
+  /// @throws OtherInstance where softarmd, or another such tool, commands this arm already
+  Commander(const Experiment& experiment, LcmNode& node);
+
+  /// Moves every pressure towards `wanted_bar` by at most the slew for the time since the last
+  /// call, at most `rate_bar_per_s`, and sends them when they are due. @throws TransportError
+  void update(const PressureVector& wanted_bar, double rate_bar_per_s, std::int64_t now_ns);
+  /// The same towards 0 bar, at actuation.vent_bar_per_s.
+  void vent(std::int64_t now_ns);
+
+  const PressureVector& sent_bar() const { return bar_; }
+  std::int64_t next_ns() const { return next_ns_; }
+  int chambers() const { return static_cast<int>(bar_.size()); }
+
+ private:
+  double step_s(std::int64_t now_ns);
+  void send(std::int64_t now_ns);
+
+  InstanceLock lock_;
+  LcmNode& node_;
+  const Experiment& experiment_;
+  PressureRamps vent_ramps_;
+  PressureVector bar_;
+  std::int64_t period_ns_, next_ns_ = 0, updated_ns_ = 0;
+  softarm_messages::pressure_command_t message_;
+};
+
+/// Number of chambers of the whole arm.
+int chamber_count(const ActuationSettings& actuation);
+
+}  // namespace softarm

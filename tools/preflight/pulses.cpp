@@ -1,0 +1,149 @@
+#include "preflight/pulses.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "preflight/checks.hpp"
+#include "softarm/daemon/safety_monitor.hpp"
+
+namespace softarm {
+namespace {
+
+constexpr std::int64_t kLost_ns = 200'000'000;  ///< without a frame, or when the daemon would vent
+constexpr double kSoft_bar_per_s = 1.0;
+constexpr double kBefore_s = 0.2;  ///< at rest, to compare with
+constexpr double kVent_s = 0.5;
+
+std::int64_t to_ns(double time_s) { return static_cast<std::int64_t>(1e9 * time_s); }
+
+class Player {
+ public:
+  Player(const Experiment& experiment, LcmNode& node, ArmListener& listener, Commander& commander,
+         const std::function<bool()>& stop)
+      : experiment_(experiment),
+        node_(node),
+        listener_(listener),
+        commander_(commander),
+        stop_(stop),
+        lost_ns_(std::max(
+            kLost_ns, resolve_thresholds(experiment.daemon.safety, 1.0 / experiment.daemon.rate_hz)
+                          .vent_after_ns)),
+        least_bar_(PressureVector::Constant(commander.chambers(),
+                                            experiment.actuation.min_pressure_bar)) {}
+
+  void pulse(Pulse pulse, double hold_s) {
+    pulse.before_ns = monotonic_now_ns();
+    hold(least_bar_, kBefore_s);
+    PressureVector filled_bar = least_bar_;
+    filled_bar[pulse.valve] = pulse.pressure_bar;
+    pulse.start_ns = monotonic_now_ns();
+    reach(filled_bar);
+    hold(filled_bar, 2.0 / 3.0 * hold_s);
+    pulse.held_ns = monotonic_now_ns();
+    hold(filled_bar, hold_s / 3.0);
+    pulse.end_ns = monotonic_now_ns();
+    if (!aborted_.empty()) return;
+    listener_.seen().pulses.push_back(pulse);
+    reach(least_bar_);
+    rest(hold_s);
+  }
+  void rest(double time_s) { hold(least_bar_, 0.75 * time_s); }
+
+  void vent() {
+    const std::int64_t end_ns = monotonic_now_ns() + to_ns(kVent_s);
+    for (std::int64_t now_ns = monotonic_now_ns();
+         now_ns < end_ns || commander_.sent_bar().maxCoeff() > 0.0; now_ns = monotonic_now_ns()) {
+      commander_.vent(now_ns);
+      node_.wait_until(commander_.next_ns());
+    }
+  }
+
+  const std::string& aborted() const { return aborted_; }
+
+ private:
+  template <class Done>
+  void command(const PressureVector& bar, const Done& done) {
+    for (std::int64_t now_ns = monotonic_now_ns(); aborted_.empty() && !done(now_ns);
+         now_ns = monotonic_now_ns()) {
+      commander_.update(bar, kSoft_bar_per_s, now_ns);
+      node_.wait_until(commander_.next_ns());
+      listener_.look_at_clock();
+      watch();
+    }
+  }
+  void hold(const PressureVector& bar, double time_s) {
+    const std::int64_t end_ns = monotonic_now_ns() + to_ns(time_s);
+    command(bar, [&](std::int64_t now_ns) { return now_ns >= end_ns; });
+  }
+  void reach(const PressureVector& bar) {
+    command(bar, [&](std::int64_t) { return commander_.sent_bar() == bar; });
+  }
+
+  void watch() {
+    const IdentificationSettings& limits = experiment_.identification;
+    const std::int64_t now_ns = monotonic_now_ns();
+    if (stop_ && stop_()) {
+      aborted_ = "stopped";
+    } else if (listener_.daemon_armed(now_ns)) {
+      aborted_ = "a daemon is armed: " + listener_.daemon_text();
+    } else if (listener_.whole_frame_ns() < now_ns - lost_ns_) {
+      aborted_ = fmt::format("no frame with every segment for {} ms", lost_ns_ / 1'000'000);
+    } else if (listener_.largest_theta_rad() > limits.max_theta_rad) {
+      aborted_ = fmt::format(
+          "a segment bends by {:.3g} rad, beyond identification.max_theta_rad of {:.3g} rad",
+          listener_.largest_theta_rad(), limits.max_theta_rad);
+    } else if (listener_.fastest_radps() > limits.max_speed_radps) {
+      aborted_ = fmt::format(
+          "a segment moves at {:.3g} rad/s, beyond identification.max_speed_radps of {:.3g} rad/s",
+          listener_.fastest_radps(), limits.max_speed_radps);
+    }
+  }
+
+  const Experiment& experiment_;
+  LcmNode& node_;
+  ArmListener& listener_;
+  Commander& commander_;
+  const std::function<bool()>& stop_;
+  std::int64_t lost_ns_;
+  PressureVector least_bar_;
+  std::string aborted_;
+};
+
+}  // namespace
+
+std::string play_pulses(const Experiment& experiment, const PulsePlan& plan, LcmNode& node,
+                        ArmListener& listener, Commander& commander,
+                        const std::function<bool()>& stop,
+                        const std::function<void(const std::string&)>& progress) {
+  listener.commanding();
+  Player player(experiment, node, listener, commander, stop);
+  const double least_bar = experiment.actuation.min_pressure_bar;
+  try {
+    player.rest(1.0);  // whoever holds the valves gets to know us with zeros
+    int valve = 0;
+    for (int i = 0; i < experiment.arm.size(); ++i) {
+      const auto& chambers = experiment.actuation.segments[static_cast<std::size_t>(i)];
+      for (int j = 0; j < static_cast<int>(chambers.size()) && player.aborted().empty();
+           ++j, ++valve) {
+        if (progress) progress(fmt::format("pulse {} of {}", valve + 1, commander.chambers()));
+        const double above_bar =
+            plan.pressure_bar > 0.0 ? plan.pressure_bar : soft_pressure_bar(experiment, i, j);
+        player.pulse({.segment = i,
+                      .chamber = j,
+                      .valve = valve,
+                      .pressure_bar =
+                          std::min(least_bar + above_bar, experiment.actuation.max_pressure_bar)},
+                     plan.hold_s);
+      }
+    }
+  } catch (...) {
+    player.vent();
+    throw;
+  }
+  const std::string aborted = player.aborted();
+  player.vent();
+  return aborted;
+}
+
+}  // namespace softarm
