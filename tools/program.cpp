@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdio>
 #include <exception>
+#include <filesystem>
 #include <iostream>
 
 #include "softarm/config/config_error.hpp"
@@ -70,6 +71,13 @@ std::string build_text() {
   return fmt::format("softarm {} commit {}; compiler {} for {}; machine{}; glibc {}",
                      version_text(), commit_text(), __VERSION__, compiled, machine,
                      gnu_get_libc_version());
+}
+
+std::string shared_file(const std::string& name, const std::string& source) {
+  std::error_code error;
+  const auto program = std::filesystem::read_symlink("/proc/self/exe", error);
+  const auto installed = program.parent_path().parent_path() / "share" / "softarm" / name;
+  return std::filesystem::exists(installed, error) ? installed.string() : source;
 }
 
 void say(const std::string& text) noexcept { std::fputs(text.c_str(), stderr); }

@@ -14,11 +14,15 @@ write_basic_package_version_file(${PROJECT_BINARY_DIR}/softarmConfigVersion.cmak
 install(FILES ${PROJECT_BINARY_DIR}/softarmConfig.cmake ${PROJECT_BINARY_DIR}/softarmConfigVersion.cmake
   ${PROJECT_SOURCE_DIR}/tools/cmake/SoftarmLcm.cmake ${PROJECT_SOURCE_DIR}/tools/cmake/SoftarmModbus.cmake
   DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/softarm)
-install(PROGRAMS tools/plot_run.py DESTINATION ${CMAKE_INSTALL_DATADIR}/softarm)
+install(PROGRAMS tools/plot_run.py tools/plot_identification.py DESTINATION ${CMAKE_INSTALL_DATADIR}/softarm)
+install(FILES tests/golden/golden.json DESTINATION ${CMAKE_INSTALL_DATADIR}/softarm)
+install(FILES README.md DESTINATION ${CMAKE_INSTALL_DOCDIR})
+install(DIRECTORY docs DESTINATION ${CMAKE_INSTALL_DOCDIR} FILES_MATCHING PATTERN "*.md" PATTERN "*.png" PATTERN "*.svg" PATTERN "*.py"
+  PATTERN "drawings.py" EXCLUDE)
 install(DIRECTORY tools/plotting DESTINATION ${CMAKE_INSTALL_DATADIR}/softarm
   FILES_MATCHING PATTERN "*.py" PATTERN "__pycache__" EXCLUDE)
 # systemd units: softarmd@NAME, softarm-valves@NAME (docs/service.md).
-install(FILES docs/service.md DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT units)
+install(FILES docs/service.md DESTINATION ${CMAKE_INSTALL_DOCDIR}/docs COMPONENT units)
 install(CODE "set(SOFTARM_UNITS \"${PROJECT_SOURCE_DIR}/config/systemd\")
 set(SOFTARM_BIN \"${CMAKE_INSTALL_BINDIR}\")
 set(SOFTARM_DOC \"${CMAKE_INSTALL_DOCDIR}\")" COMPONENT units)

@@ -20,7 +20,7 @@ struct BenchOptions {
 
 void bench(BenchOptions options) {
   if (options.golden.empty()) {
-    options.golden = SOFTARM_GOLDEN_FILE;
+    options.golden = shared_file("golden.json", SOFTARM_GOLDEN_FILE);
     if (!std::filesystem::exists(options.golden)) {
       print_error("softarm", "no golden file where this was built; name one with --golden");
       options.golden.clear();
@@ -53,7 +53,7 @@ void add_bench_command(CLI::App& app) {
       ->capture_default_str();
   command
       ->add_option("--golden", options->golden,
-                   "golden file to take errors from (default: the source tree's)")
+                   "golden file to take errors from (default: the one that comes with softarm)")
       ->check(CLI::ExistingFile);
   command->callback([options] { bench(*options); });
 }

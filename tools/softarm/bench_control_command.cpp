@@ -32,8 +32,8 @@ void measure_and_print(const Options& options, const Measure& measure) {
   std::fwrite(text.data(), 1, text.size(), stdout);
 }
 
-std::string in_source_tree(const char* name) {
-  return std::string(SOFTARM_CONFIG_FOLDER "/") + name;
+std::string our_config(const std::string& name) {
+  return shared_file("config/" + name, SOFTARM_CONFIG_FOLDER "/" + name);
 }
 
 CLI::App* add(CLI::App& group, const char* name, const char* doc, Options& options,
@@ -41,7 +41,8 @@ CLI::App* add(CLI::App& group, const char* name, const char* doc, Options& optio
   options.configs = std::move(configs);
   CLI::App* command = group.add_subcommand(name, doc);
   command->add_flag("--json", options.json, "print JSON instead of tables");
-  command->add_option("CONFIG", options.configs, "experiments (default: the source tree's)");
+  command->add_option("CONFIG", options.configs,
+                      "experiments (default: those that come with softarm)");
   return command;
 }
 
@@ -51,7 +52,7 @@ void add_bench_control_commands(CLI::App& group) {
   auto control = std::make_shared<Options>();
   CLI::App* command =
       add(group, "control", "Tracking error against control rate and the terms of (17), their cost",
-          *control, {in_source_tree("paper_arm.yaml"), in_source_tree("paper_simulation.yaml")});
+          *control, {our_config("paper_arm.yaml"), our_config("paper_simulation.yaml")});
   command->add_option("--seconds", control->seconds, "simulated time of every run, in s")
       ->check(positive_seconds())
       ->capture_default_str();
@@ -71,7 +72,7 @@ void add_bench_control_commands(CLI::App& group) {
   auto stability = std::make_shared<Options>();
   command =
       add(group, "stability", "Stability over K_P, dead time and valve lag: theory, simulation",
-          *stability, {in_source_tree("paper_arm.yaml")});
+          *stability, {our_config("paper_arm.yaml")});
   command->add_option("--points", stability->points, "along every axis of the maps")
       ->check(CLI::Range(2, 100))
       ->capture_default_str();
@@ -87,7 +88,7 @@ void add_bench_control_commands(CLI::App& group) {
 
   auto softness = std::make_shared<Options>();
   command = add(group, "softness", "Stiffness of the tip and tracking error, over K_P", *softness,
-                {in_source_tree("paper_arm_nominal.yaml")});
+                {our_config("paper_arm_nominal.yaml")});
   command->callback([softness] {
     measure_and_print(*softness, [&](const BenchProgress& progress) {
       return bench_softness(load_experiment(softness->configs.at(0)), progress);
