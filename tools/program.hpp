@@ -27,8 +27,8 @@ const char* commit_text() noexcept;
 /// the one that the C library's functions choose by on this machine, and that library's version.
 std::string build_text();
 
-/// A file that comes with the programs: `name` in PREFIX/share/softarm of the installed program that
-/// runs, else `source`, where it is in the tree this was built from.
+/// A file that comes with the programs: `name` in PREFIX/share/softarm of the installed program
+/// that runs, else `source`, where it is in the tree this was built from.
 std::string shared_file(const std::string& name, const std::string& source);
 
 /// Prints on stderr. What cannot be written (a full disk, a closed pipe) is lost: no program that
