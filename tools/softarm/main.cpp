@@ -8,6 +8,7 @@ int main(int argc, char** argv) {
   CLI::App app("Tools for soft continuum arms under closed-loop control", "softarm");
   app.require_subcommand(0, 1);
   softarm::add_bench_command(app);
+  softarm::add_calibrate_command(app);
   softarm::add_check_command(app);
   softarm::add_eval_command(app);
   softarm::add_identify_command(app);
