@@ -2,7 +2,6 @@
 
 Runs in the Python of tools/python_environment; skipped where that was not made.
 """
-import json
 import os
 import pathlib
 import struct
@@ -11,7 +10,7 @@ import sys
 import tempfile
 import unittest
 
-from running_arm import ROOT, own_url, skip_without_multicast, start, write_config
+from running_arm import ROOT, own_url, skip_without_multicast, start, tracks_within, write_config
 
 EXAMPLE = ROOT / "docs/examples/republish.py"
 PYTHON = ROOT / "build/python/bin/python"
@@ -44,23 +43,19 @@ class Mocap(unittest.TestCase):
         folder.mkdir()
         return write_config(folder, f"{base}.yaml", self.url, more)
 
-    def watch(self, config):
-        """What softarm watch makes of four seconds of tracking."""
-        out = self.folder / "out"
-        watch = subprocess.run([PROGRAMS / "softarm", "watch", config, "--duration", "4", "--out", out],
-                               capture_output=True, text=True, timeout=120, check=False)
-        self.assertEqual(watch.returncode, 0, watch.stderr)
-        return json.loads((out / "summary.json").read_text(encoding="utf-8"))
-
     def closes(self, config, source):
         start(self, self.folder, PYTHON, "-B", EXAMPLE, "--url", self.url, "--source", source)
         start(self, self.folder, PROGRAMS / "softarmd", config)
-        self.assertLess(self.watch(config)["tracking"]["u_rms_rad"], BOUND_RAD)
+        tracks_within(self, PROGRAMS, config, BOUND_RAD)
 
     def test_the_loop_closes_through_optitrack_frames_and_modbus(self):
         port = str(20000 + os.getpid() % 40000)
         valves = f"valves: {{port: {port}}}\n"
-        config = self.config("paper_arm_every_interface", valves)
+        every = self.config("paper_arm_every_interface", valves)
+        # A machine that is busy with other things must not look like a faulty terminal.
+        config = every.parent / "patient.yaml"
+        config.write_text(f"include: {every}\nname: patient\nvalves: {{tolerated_failures: 100, failsafe_timeout_s: 0.5}}\n"
+                          "daemon: {safety: {pressure_tolerance_bar: 0, valve_silence_s: 10}}\n", encoding="utf-8")
         start(self, self.folder, PROGRAMS / "softarm-plant", "--modbus", port, self.config("paper_arm_modbus", valves))
         start(self, self.folder, PROGRAMS / "softarm-valves", config)
         self.closes(config, "optitrack")
@@ -95,7 +90,7 @@ class Mocap(unittest.TestCase):
             self.assertGreater(node.handle_timeout(20000), 0, "no status any more")
         self.assertEqual(malformed[-1], sent)
         self.assertIsNone(daemon.poll())
-        self.assertLess(self.watch(config)["tracking"]["u_rms_rad"], BOUND_RAD)
+        tracks_within(self, PROGRAMS, config, BOUND_RAD)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,5 @@
 """What the tests of scripts share that look at a running arm: a port of their own, programs that end with the test."""
+import json
 import os
 import pathlib
 import signal
@@ -38,3 +39,20 @@ def start(test, folder, *command):
 
     test.addCleanup(end)
     return process
+
+
+def tracks_within(test, programs, config, bound_rad, patience=8):
+    """Waits for four seconds in which the arm follows its reference within `bound_rad` (RMS of u); a machine that is busy with other
+    things may need several beginnings."""
+    seen = []
+    for attempt in range(patience):
+        out = pathlib.Path(config).parent / f"tracked_{attempt}"
+        watch = subprocess.run([programs / "softarm", "watch", config, "--duration", "4", "--out", out],
+                               capture_output=True, text=True, timeout=120, check=False)
+        if watch.returncode == 0:
+            seen.append(json.loads((out / "summary.json").read_text(encoding="utf-8"))["tracking"]["u_rms_rad"])
+            if seen[-1] < bound_rad:
+                return
+        else:
+            seen.append(watch.stderr)
+    test.fail(f"never within {bound_rad} rad: {seen}")
