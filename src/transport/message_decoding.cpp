@@ -1,5 +1,6 @@
 #include "softarm/transport/message_decoding.hpp"
 
+#include <algorithm>
 #include <cstdint>
 
 #include "softarm/actuation/pressure_allocator.hpp"
@@ -31,6 +32,16 @@ std::int64_t length32_at(std::span<const std::byte> bytes, std::size_t offset) n
 
 /// A length within [0, limit], or -1.
 int bounded(int length, int limit) noexcept { return length <= limit ? length : -1; }
+
+/// Whether a text of `length` bytes, counted with its end, ends there and not before. LCM's decoder
+/// takes any byte for the end; its encoder writes up to the first 0.
+bool text_at(std::span<const std::byte> bytes, std::size_t offset, std::int64_t length) noexcept {
+  if (length < 1 || length > static_cast<std::int64_t>(kLongestText)) return false;
+  const auto size = static_cast<std::size_t>(length);
+  if (bytes.size() < offset + size) return false;
+  const auto text = bytes.subspan(offset, size);
+  return std::find(text.begin(), text.end(), std::byte{0}) == text.end() - 1;
+}
 
 template <class Message>
 bool decode_exactly(std::span<const std::byte> bytes, std::size_t expected,
@@ -86,7 +97,7 @@ bool decode(std::span<const std::byte> bytes,
             softarm_messages::controller_status_t& message) noexcept {
   constexpr std::size_t kBeforeVersion = 5 * 8;
   const std::int64_t version = length32_at(bytes, kHash + kBeforeVersion);
-  if (version < 1 || version > static_cast<std::int64_t>(kLongestText)) return false;
+  if (!text_at(bytes, kHash + kBeforeVersion + 4, version)) return false;
   const std::size_t counts =
       kHash + kBeforeVersion + 4 + static_cast<std::size_t>(version) + 4 + 4 + 6 * 4;
   const int segments = bounded(length16_at(bytes, counts), kMaxSegments);
@@ -128,7 +139,7 @@ bool decode(std::span<const std::byte> bytes, softarm_messages::tick_record_t& m
     at += 2 * 8 + 2 + kBody * static_cast<std::size_t>(bodies);
   }
   const std::int64_t build = length32_at(bytes, at);
-  if (build < 1 || build > static_cast<std::int64_t>(kLongestText)) return false;
+  if (!text_at(bytes, at + 4, build)) return false;
   return decode_exactly(bytes, at + 4 + static_cast<std::size_t>(build) + 8, message);
 }
 

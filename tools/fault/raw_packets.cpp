@@ -13,6 +13,7 @@ namespace softarm {
 namespace {
 
 constexpr std::uint32_t kShortMessage = 0x4c433032;  ///< "LC02"
+constexpr std::uint32_t kFragment = 0x4c433033;      ///< "LC03"
 
 void put32(std::uint32_t value, Packet& packet) {
   for (int shift = 24; shift >= 0; shift -= 8)
@@ -103,37 +104,63 @@ std::vector<Packet> hostile_packets(const std::string& channel, std::span<const 
   return packets;
 }
 
-std::vector<Packet> hostile_packets(const LcmSettings& lcm) {
+std::vector<SampleMessage> sample_messages(const LcmSettings& lcm, int segments, int chambers) {
   using namespace softarm_messages;
   constexpr std::size_t kHash = 8;
-  std::vector<Packet> all;
-  const auto add = [&](const std::string& channel, const auto& message, std::size_t count_at) {
+  std::vector<SampleMessage> all;
+  const auto add = [&](const std::string& channel, const auto& message, std::size_t count_at,
+                       std::size_t number_bytes) {
     if (channel.empty()) return;
     Packet bytes(static_cast<std::size_t>(message.getEncodedSize()));
     message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
-    const auto packets = hostile_packets(channel, bytes, count_at);
-    all.insert(all.end(), packets.begin(), packets.end());
+    all.push_back({channel, bytes, count_at, number_bytes > 0 ? count_at + 2 : 0, number_bytes});
   };
   mocap_frame_t frame{};
-  frame.num_bodies = 1;
-  frame.bodies.resize(1);
-  add(lcm.mocap_channel, frame, kHash + 16);
+  frame.num_bodies = static_cast<std::int16_t>(segments + 1);
+  frame.bodies.resize(static_cast<std::size_t>(segments) + 1);
+  add(lcm.mocap_channel, frame, kHash + 16, 0);
   curvature_reference_t reference{};
-  reference.dimension = 1;
+  reference.dimension = static_cast<std::int16_t>(2 * segments);
   for (auto* list : {&reference.u_rad, &reference.velocity_radps, &reference.acceleration_radps2})
-    list->resize(1);
-  add(lcm.reference_channel, reference, kHash + 8);
+    list->resize(2 * static_cast<std::size_t>(segments));
+  add(lcm.reference_channel, reference, kHash + 8, 8);
   pressure_measurement_t measured{};
-  measured.num_chambers = 1;
-  measured.pressure_bar.resize(1);
-  add(lcm.measurement_channel, measured, kHash + 16);
+  measured.num_chambers = static_cast<std::int16_t>(chambers);
+  measured.pressure_bar.resize(static_cast<std::size_t>(chambers));
+  add(lcm.measurement_channel, measured, kHash + 16, 4);
   pressure_command_t command{};
-  command.num_chambers = 1;
-  command.pressure_bar.resize(1);
-  add(lcm.command_channel, command, kHash + 21);
-  add(lcm.operator_channel, operator_command_t{.sequence = 1, .request = 0}, 0);
-  add(lcm.deadman_channel, deadman_t{.sequence = 1, .go = 0}, 0);
+  command.num_chambers = measured.num_chambers;
+  command.pressure_bar = measured.pressure_bar;
+  add(lcm.command_channel, command, kHash + 21, 4);
+  add(lcm.operator_channel, operator_command_t{.sequence = 1, .request = 0}, 0, 0);
+  add(lcm.deadman_channel, deadman_t{.sequence = 1, .go = 0}, 0, 0);
   return all;
+}
+
+std::vector<Packet> hostile_packets(const LcmSettings& lcm) {
+  std::vector<Packet> all;
+  for (const SampleMessage& sample : sample_messages(lcm, 1, 1)) {
+    const auto packets = hostile_packets(sample.channel, sample.bytes, sample.count_at);
+    all.insert(all.end(), packets.begin(), packets.end());
+  }
+  return all;
+}
+
+std::array<Packet, 2> fragments_that_end_subscribers() {
+  const auto fragment = [](std::uint32_t offset, std::uint32_t number) {
+    Packet packet;
+    put32(kFragment, packet);
+    put32(7, packet);                 // the message's number
+    put32(2000, packet);              // its size
+    put32(offset, packet);            // where this fragment belongs
+    put32(number << 16 | 2, packet);  // the second of two
+    return packet;
+  };
+  Packet first = fragment(0, 0), second = fragment(0xfffff800, 1);
+  first.insert(first.end(), {std::byte{'A'}, std::byte{0}});
+  first.insert(first.end(), 100, std::byte{1});
+  second.insert(second.end(), 0x900, std::byte{2});
+  return {first, second};
 }
 
 }  // namespace softarm

@@ -3,6 +3,7 @@
 
 #include <netinet/in.h>
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -35,6 +36,18 @@ class RawSender {
 /// A packet that LCM takes for a message of these bytes on this channel.
 Packet lcm_packet(const std::string& channel, std::span<const std::byte> payload);
 
+/// A good message of a channel, and where it may be spoilt.
+struct SampleMessage {
+  std::string channel;
+  Packet bytes;
+  std::size_t count_at = 0;  ///< of its 16 bit count; 0: it has none
+  std::size_t number_at =
+      0;  ///< of a number that must be finite; 0: none that is judged when it comes
+  std::size_t number_bytes = 0;  ///< 4 or 8
+};
+/// One of every channel that the daemon listens to, and of its commands.
+std::vector<SampleMessage> sample_messages(const LcmSettings& lcm, int segments, int chambers);
+
 /// What is no message, in a packet for this channel: no header, half of one, no end of the
 /// channel's name, nothing at all, another type, `message` cut off, `message` with bytes behind it,
 /// and with the 16 bit count at `count_at` (0: it has none) made negative, huge and wrong.
@@ -44,5 +57,9 @@ std::vector<Packet> hostile_packets(const std::string& channel, std::span<const 
 
 /// The above for every channel that the daemon listens to, and for its commands.
 std::vector<Packet> hostile_packets(const LcmSettings& lcm);
+
+/// The beginning of a message in fragments, and a second fragment whose offset and size together
+/// pass 2^32: inside LCM 1.3.1 they end every process on the group that subscribes to anything.
+std::array<Packet, 2> fragments_that_end_subscribers();
 
 }  // namespace softarm

@@ -20,9 +20,9 @@
 
 namespace softarm {
 
-/// False, and `message` unspecified, unless `bytes` are exactly one message of this type: right
-/// hash, lengths within this project's capacities, no byte missing and none left over. Values are
-/// not judged. Allocates nothing once `message` has held one of its size.
+/// False, and `message` unspecified, unless `bytes` are what the encoder of this type writes: right
+/// hash, lengths within this project's capacities, texts that end there, no byte too few or many.
+/// Values are not judged. Allocates nothing once `message` has held one of its size.
 bool decode(std::span<const std::byte> bytes, softarm_messages::mocap_frame_t& message) noexcept;
 bool decode(std::span<const std::byte> bytes,
             softarm_messages::pressure_command_t& message) noexcept;

@@ -47,6 +47,7 @@ class Process {
   Process& operator=(const Process&) = delete;
 
   void signal(int number) const { kill(pid_, number); }
+  pid_t pid() const { return pid_; }
 
   /// Stops it, and returns once it does not run any more.
   void stop() const {

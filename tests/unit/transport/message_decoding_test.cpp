@@ -32,6 +32,7 @@ std::vector<LengthField> length_fields(const Message&) {
 }
 std::vector<LengthField> length_fields(const mocap_frame_t&) { return {{24, 2}}; }
 std::vector<LengthField> length_fields(const pressure_command_t&) { return {{29, 2}}; }
+std::vector<LengthField> length_fields(const torque_command_t&) { return {{29, 2}}; }
 std::vector<LengthField> length_fields(const pressure_measurement_t&) { return {{24, 2}}; }
 std::vector<LengthField> length_fields(const curvature_reference_t&) { return {{16, 2}}; }
 std::vector<LengthField> length_fields(const valves_status_t&) { return {{64, 2}}; }
@@ -73,7 +74,8 @@ class MessageDecoding : public ::testing::Test {
 using AllMessages =
     ::testing::Types<mocap_frame_t, pressure_command_t, pressure_measurement_t,
                      curvature_reference_t, operator_command_t, controller_status_t, plant_state_t,
-                     timing_t, tick_record_t, valves_status_t, deadman_t, rigid_transform_t>;
+                     timing_t, tick_record_t, valves_status_t, deadman_t, rigid_transform_t,
+                     torque_command_t>;
 class MessageName {
  public:
   template <class Message>
@@ -140,6 +142,29 @@ TYPED_TEST(MessageDecoding, EveryWrongLengthIsRefused) {
       }
     }
   }
+}
+
+// A text is its length, its letters and a byte 0: what ends otherwise, or holds another 0, would be
+// another text once it is encoded again.
+TEST(MessageDecoding, TextsThatDoNotEndWhereTheySayAreRefused) {
+  const auto refused = [](const auto& message, std::size_t length_at, std::size_t length) {
+    const Bytes whole = encoded(message);
+    auto into = message;
+    ASSERT_TRUE(decode(whole, into));
+    ASSERT_EQ(get(whole, {length_at, 4}), static_cast<std::int64_t>(length) + 1);
+    Bytes endless = whole;
+    endless[length_at + 4 + length] = std::byte{'x'};
+    EXPECT_FALSE(decode(endless, into));
+    for (std::size_t k = 0; k < length; ++k) {
+      Bytes broken = whole;
+      broken[length_at + 4 + k] = std::byte{0};
+      ASSERT_FALSE(decode(broken, into)) << k;
+    }
+  };
+  const auto status = example<controller_status_t>(3, 4);
+  refused(status, length_fields(status)[0].offset, status.version.size());
+  const auto record = example<tick_record_t>(3, 4);
+  refused(record, length_fields(record)[5].offset, record.build.size());
 }
 
 // A length beyond this project's capacities is refused even where the bytes are all there.

@@ -75,6 +75,16 @@ inline softarm_messages::pressure_command_t example(int segments, int chambers) 
 }
 
 template <>
+inline softarm_messages::torque_command_t example(int segments, int /*chambers*/) {
+  return {.sequence = 42,
+          .time_us = 43,
+          .validity_us = 100'000,
+          .shadow = 0,
+          .num_moments = static_cast<std::int16_t>(2 * segments),
+          .torque_nm = numbers<double>(2 * segments, -0.5)};
+}
+
+template <>
 inline softarm_messages::pressure_measurement_t example(int segments, int chambers) {
   return {.sequence = -1,
           .time_us = 44,

@@ -1,0 +1,162 @@
+// Malformed packets by the thousand (slow: by the million) while the arm is under control, and the
+// one packet that no process survives.
+#include <algorithm>
+#include <chrono>
+#include <cstdlib>
+#include <iostream>
+#include <regex>
+#include <thread>
+
+#include "fault/hostile_packets.hpp"
+#include "faults/softarmd/fault_test.hpp"
+
+namespace softarm {
+namespace {
+
+using namespace std::chrono_literals;
+using test::FaultTest;
+using test::Process;
+using test::Station;
+
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+constexpr bool kSanitized = true;  // a sanitizer keeps what is freed
+#else
+constexpr bool kSanitized = false;
+#endif
+
+class HostileBytes : public FaultTest {
+ protected:
+  void arm() {
+    using Request = softarm_messages::operator_command_t;
+    Request request{.sequence = 0, .request = Request::ARM};
+    EXPECT_TRUE(wait_for([&] {
+      if (mode() != Mode::active && ++request.sequence % 10 == 0)
+        node_->publish("SOFTARM_OPERATOR", request);
+      return under_pressure();
+    })) << told();
+  }
+
+  /// The arm behind a terminal of its own, at a port of the kernel's choice.
+  std::unique_ptr<Process> start_terminal(int& port) {
+    auto plant = start("softarm-plant", {"--modbus", "0"});
+    std::smatch match;
+    std::string printed;
+    wait_for([&] {
+      printed = plant->printed();
+      return std::regex_search(printed, match, std::regex("127.0.0.1 port ([0-9]+)"));
+    });
+    port = match.empty() ? 0 : std::stoi(match[1]);
+    EXPECT_GT(port, 0) << printed;
+    return plant;
+  }
+
+  bool arm_is_vented() const {
+    return plant_.vented != 0 && !plant_.pressure_bar.empty() &&
+           largest(plant_.pressure_bar) < 1e-3F;
+  }
+};
+
+/// Resident memory of a process, kB.
+long resident_kb(int pid) {
+  std::ifstream file("/proc/" + std::to_string(pid) + "/status");
+  long kb = 0;
+  for (std::string line; std::getline(file, line);)
+    if (std::sscanf(line.c_str(), "VmRSS: %ld kB", &kb) == 1) return kb;
+  return 0;
+}
+
+TEST_P(HostileBytes, MalformedPacketsWithoutEndAreRefusedWhileTheArmIsControlled) {
+  const char* wanted = std::getenv("SOFTARM_HOSTILE_PACKETS");
+  const long packets = wanted != nullptr ? std::atol(wanted) : 10'000;
+  lcm_ = ", deadman_channel: GO";
+  // Thresholds that no machine reaches by being busy: whatever is seen, the packets have done.
+  write_config("paper_arm.yaml",
+               "  safety: {hold_after_s: 1, vent_after_s: 2, deadman_timeout_s: 2, "
+               "valve_readback: true, valve_silence_s: 2, pressure_settling_s: 2, good_frames: "
+               "20}\n");
+  const auto plant = start_plant(*this);
+  const auto daemon = start("softarmd");
+  const auto deadman = start("softarm", {"deadman"});
+  arm();
+  const int before = status_.messages_malformed;
+  const long memory_kb = resident_kb(daemon->pid());
+  forget();
+
+  HostilePackets hostile(load_experiment(config_.string()).daemon.lcm, 3, 12, 20261122);
+  RawSender sender(url_);
+  const std::int64_t start_ns = monotonic_now_ns();
+  const int ticks_before = statuses_;
+  for (long sent = 0; sent < packets;) {  // 4 a millisecond: the real frames find their place
+    for (int k = 0; k < 4 && sent < packets; ++k) sent += sender.send(hostile.next()) ? 1 : 0;
+    node_->wait_until(monotonic_now_ns() + test::kSecond / 1000);
+    node_->drain(100);
+  }
+  const double passed_s = 1e-9 * static_cast<double>(monotonic_now_ns() - start_ns);
+  EXPECT_TRUE(stays_active(*this)) << told() << daemon->printed();
+  const int refused = status_.messages_malformed - before;
+  const long grown_kb = resident_kb(daemon->pid()) - memory_kb;
+  std::cout << packets << " malformed packets in " << passed_s << " s, " << refused
+            << " reached softarmd's decoders and were refused, " << statuses_ - ticks_before
+            << " statuses; resident memory " << memory_kb << " kB, then " << grown_kb
+            << " kB more\n";
+  EXPECT_GT(refused, packets / 10);
+  EXPECT_LT(refused, packets);
+  for (const auto& [seen_mode, seen_reason] : seen_)
+    EXPECT_EQ(seen_mode, Mode::active) << name(seen_reason);
+  if (!kSanitized) {
+    EXPECT_LT(grown_kb, 1024);
+  }
+  expect_limits(*this);
+  daemon->signal(SIGTERM);
+  EXPECT_EQ(daemon->wait(5000ms), 0) << daemon->printed();
+  EXPECT_EQ(plant->wait(0ms), -1) << "the plant lives" << plant->printed();
+}
+
+// A second fragment that lies about its place ends every subscriber inside LCM 1.3.1: daemon and
+// valve driver. The terminal vents by its own time-out; started again, as systemd does, the daemon
+// waits for frames and for a person, and commands nothing meanwhile.
+TEST_P(HostileBytes, TheFragmentThatEndsEverySubscriberLeavesTheArmVentedAndTheRestartUnarmed) {
+  const std::string safety =
+      "  safety: {arming: explicit, valve_readback: true, good_frames: 20}\n";
+  write_config("paper_arm_modbus.yaml", safety);
+  int port = 0;
+  const auto plant = start_terminal(port);
+  write_config("paper_arm_modbus.yaml", safety,
+               "valves: {port: " + std::to_string(port) + ", failsafe_timeout_s: 0.3}\n");
+  auto valves = start("softarm-valves");
+  auto daemon = start("softarmd");
+  arm();
+
+  node_.reset();  // it would end us as well
+  RawSender sender(url_);
+  for (const Packet& packet : fragments_that_end_subscribers()) sender.send(packet);
+  const int ended = daemon->wait(10s);
+  if (ended == -1) GTEST_SKIP() << "this LCM survives the fragment";
+  EXPECT_NE(ended, 0) << "a supervisor must see a failure";
+  EXPECT_GT(valves->wait(10s), 0);
+  EXPECT_EQ(plant->wait(0ms), -1) << "who subscribes to nothing lives";
+
+  plant_ = {};
+  listen();
+  EXPECT_TRUE(wait_for([&] { return arm_is_vented(); })) << plant->printed();
+
+  status_ = {};
+  statuses_ = commands_ = 0;
+  forget();
+  daemon = start("softarmd");
+  valves = start("softarm-valves");
+  EXPECT_TRUE(wait_for([&] {
+    return mode() == Mode::wait_frames && reason() == Reason::waiting_for_arm && statuses_ > 200;
+  })) << told()
+      << daemon->printed();
+  EXPECT_FALSE(saw(Mode::active, Reason::none)) << "nobody armed it";
+  EXPECT_GT(commands_, 0);
+  EXPECT_EQ(largest(command_.pressure_bar), 0.0F);
+  EXPECT_TRUE(arm_is_vented() || largest(plant_.pressure_bar) < 1e-3F);
+  arm();
+}
+
+INSTANTIATE_TEST_SUITE_P(AsItIs, HostileBytes, ::testing::Values(test::Machine::idle));
+
+}  // namespace
+}  // namespace softarm
