@@ -6,8 +6,10 @@
 #include <cerrno>
 #include <cstring>
 #include <memory>
+#include <random>
 
 #include "fault/fault_relay.hpp"
+#include "fault/hostile_packets.hpp"
 #include "fault/raw_packets.hpp"
 #include "program.hpp"
 #include "signals.hpp"
@@ -22,6 +24,7 @@ struct Options {
   std::string suffix = kSensorSuffix;
   double amount = 0.0, after_s = 2.0, for_s = 2.0;
   int body = 1, pid = 0;
+  long packets = 0;
   bool has_amount = false, list = false;
 };
 
@@ -33,6 +36,8 @@ constexpr OtherFault kOthers[] = {
     {"none", "everything goes through", "ACTIVE"},
     {"hostile", "bytes that are no message, on every channel of the daemon",
      "refused, counted, told once a second; ACTIVE"},
+    {"fragment", "a second fragment that lies about its place, once",
+     "LCM 1.3.1 ends every process that subscribes; the arm vents; restarted: WAIT_FRAMES"},
     {"flood", "frames that repeat, as fast as they can be sent",
      "bounded work a tick; where real frames are lost HOLD or VENT, then ACTIVE"},
     {"pause", "SIGSTOP for --for seconds, then SIGCONT, to process --pid",
@@ -70,6 +75,29 @@ void send_packets(const std::string& url, const std::vector<Packet>& packets, do
   say(fmt::format("softarm-fault: {} packets sent\n", sent));
 }
 
+/// Sends malformed packets, four a millisecond: real messages find their place between them.
+void send_malformed(const Experiment& experiment, long packets) {
+  std::size_t chambers = 0;
+  for (const auto& segment : experiment.actuation.segments) chambers += segment.size();
+  HostilePackets hostile(experiment.daemon.lcm, experiment.arm.size(), static_cast<int>(chambers),
+                         std::random_device{}());
+  RawSender sender(experiment.daemon.lcm.url);
+  const std::int64_t start_ns = monotonic_now_ns();
+  std::int64_t told_ns = start_ns;
+  long sent = 0;
+  while (stop_requested == 0 && sent < packets) {
+    for (int k = 0; k < 4 && sent < packets; ++k) sent += sender.send(hostile.next()) ? 1 : 0;
+    const std::int64_t now_ns = monotonic_now_ns();
+    if (now_ns - told_ns > 2'000'000'000) {
+      say(fmt::format("softarm-fault: {} of {} packets sent\n", sent, packets));
+      told_ns = now_ns;
+    }
+    sleep_until_ns(now_ns + 1'000'000);
+  }
+  say(fmt::format("softarm-fault: {} packets sent in {:.1f} s\n", sent,
+                  1e-9 * static_cast<double>(monotonic_now_ns() - start_ns)));
+}
+
 int pause_process(const Options& options) {
   const auto send = [&](int number) {
     if (options.pid > 1 && kill(options.pid, number) == 0) return true;
@@ -95,6 +123,15 @@ int make(const Options& options) {
   const LcmSettings& lcm = experiment.daemon.lcm;
   catch_stop_signals();
   if (options.fault == "pause") return pause_process(options);
+  if (options.fault == "hostile" && options.packets > 0) {
+    send_malformed(experiment, options.packets);
+    return kExitOk;
+  }
+  if (options.fault == "fragment") {
+    RawSender sender(lcm.url);
+    for (const Packet& packet : fragments_that_end_subscribers()) sender.send(packet);
+    return kExitOk;
+  }
   if (options.fault == "hostile") {
     send_packets(lcm.url, hostile_packets(lcm), options.for_s, 1'000'000);
     return kExitOk;
@@ -163,6 +200,9 @@ int main(int argc, char** argv) {
   app.add_option("--for", options.for_s, "seconds until it ends")
       ->check(softarm::positive_seconds());
   app.add_option("--sensor-suffix", options.suffix, "of the channels the sensors publish on");
+  app.add_option("--packets", options.packets,
+                 "of hostile: so many that are malformed at random, instead of some for --for s")
+      ->check(CLI::PositiveNumber);
   app.add_option("--pid", options.pid, "of the process to pause")->check(CLI::PositiveNumber);
   return softarm::run_program(argc, argv, app, [&]() -> int {
     options.has_amount = amount->count() > 0;

@@ -176,12 +176,17 @@ std::string read_text(const std::filesystem::path& file) {
     throw ConfigError(file.string(), 0, "", "a configuration file", "a folder");
   }
   std::ifstream stream(file, std::ios::binary);
-  std::string text(kMaxFileBytes + 1, '\0');
-  if (stream) stream.read(text.data(), static_cast<std::streamsize>(text.size()));
+  constexpr std::size_t kBlock = 16 * 1024;
+  std::string text;
+  while (stream && text.size() <= kMaxFileBytes) {
+    const std::size_t before = text.size();
+    text.resize(before + kBlock);
+    stream.read(text.data() + before, static_cast<std::streamsize>(kBlock));
+    text.resize(before + static_cast<std::size_t>(stream.gcount()));
+  }
   if (!stream && !stream.eof()) {
     throw ConfigError(file.string(), 0, "", "a readable file", "no permission to read it");
   }
-  text.resize(static_cast<std::size_t>(stream.gcount()));
   if (text.size() > kMaxFileBytes) {
     throw ConfigError(file.string(), 0, "", fmt::format("at most {} bytes", kMaxFileBytes), "more");
   }

@@ -1,6 +1,6 @@
 // Configurations: what is accepted is written and read again as the same experiment, builds a
 // pipeline, and lets that tick.
-#include <regex>
+#include <cctype>
 #include <set>
 
 #include "fuzz/memory_file.hpp"
@@ -60,9 +60,12 @@ std::vector<std::string> yaml_words() {
       "- ",   ": ",    "{",    "}",   "[",   "]",     "? ",     "|\n",  ">\n",  "&a ",    "*a",
       "!!x ", "'",     "\"",   "---", "...", "\t",    "#",      "%",    "<<: ", "0",      "-1"};
   const std::string text = template_text();
-  const std::regex key("([a-z][a-z0-9_]*):");
-  for (std::sregex_iterator at(text.begin(), text.end(), key), end; at != end; ++at)
-    words.insert((*at)[1].str() + ": ");
+  const auto of_key = [](unsigned char c) { return std::isalnum(c) != 0 || c == '_'; };
+  for (std::size_t at = text.find(':'); at != std::string::npos; at = text.find(':', at + 1)) {
+    std::size_t begin = at;
+    while (begin > 0 && of_key(static_cast<unsigned char>(text[begin - 1]))) --begin;
+    if (begin < at) words.insert(text.substr(begin, at - begin) + ": ");
+  }
   return {words.begin(), words.end()};
 }
 
