@@ -36,8 +36,8 @@ constexpr OtherFault kOthers[] = {
     {"none", "everything goes through", "ACTIVE"},
     {"hostile", "bytes that are no message, on every channel of the daemon",
      "refused, counted, told once a second; ACTIVE"},
-    {"fragment", "a second fragment that lies about its place, once",
-     "LCM 1.3.1 ends every process that subscribes; the arm vents; restarted: WAIT_FRAMES"},
+    {"fragment", "second fragments that lie about their place, of frames and commands",
+     "LCM 1.3.1 ends who subscribes; the arm vents; restarted: WAIT_FRAMES"},
     {"flood", "frames that repeat, as fast as they can be sent",
      "bounded work a tick; where real frames are lost HOLD or VENT, then ACTIVE"},
     {"pause", "SIGSTOP for --for seconds, then SIGCONT, to process --pid",
@@ -129,7 +129,8 @@ int make(const Options& options) {
   }
   if (options.fault == "fragment") {
     RawSender sender(lcm.url);
-    for (const Packet& packet : fragments_that_end_subscribers()) sender.send(packet);
+    for (const std::string& channel : {lcm.command_channel, lcm.mocap_channel})
+      for (const Packet& packet : fragments_that_end_subscribers(channel)) sender.send(packet);
     return kExitOk;
   }
   if (options.fault == "hostile") {

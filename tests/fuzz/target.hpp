@@ -44,6 +44,8 @@ inline std::string to_text(std::span<const std::byte> bytes) {
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
+void run_optitrack(std::span<const std::byte> input);
+std::vector<Bytes> optitrack_seeds();
 void run_yaml(std::span<const std::byte> input);
 std::vector<Bytes> yaml_seeds();
 std::vector<std::string> yaml_words();

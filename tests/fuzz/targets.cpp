@@ -19,11 +19,13 @@ const std::vector<FuzzTarget>& fuzz_targets() {
       decoder<timing_t>(),
       decoder<tick_record_t>(),
       decoder<valves_status_t>(),
+      decoder<rigid_transform_t>(),
+      {"optitrack_frame_t", run_optitrack, optitrack_seeds, decoder_words, 2048, 10'000'000},
       {"yaml", run_yaml, yaml_seeds, yaml_words, 4096, kLong},
       {"log", run_log, log_seeds, log_words, 4096, kLong},
       {"replay", run_replay, replay_seeds, replay_words, 8192, kLong},
       {"recording", run_recording, recording_seeds, recording_words, 4096, kLong},
-      {"frames", run_frames, frames_seeds, decoder_words, 4096, kLong},
+      {"frames", run_frames, frames_seeds, decoder_words, 4096, 100'000},
   };
   return targets;
 }

@@ -146,7 +146,7 @@ std::vector<Packet> hostile_packets(const LcmSettings& lcm) {
   return all;
 }
 
-std::array<Packet, 2> fragments_that_end_subscribers() {
+std::array<Packet, 2> fragments_that_end_subscribers(const std::string& channel) {
   const auto fragment = [](std::uint32_t offset, std::uint32_t number) {
     Packet packet;
     put32(kFragment, packet);
@@ -157,7 +157,8 @@ std::array<Packet, 2> fragments_that_end_subscribers() {
     return packet;
   };
   Packet first = fragment(0, 0), second = fragment(0xfffff800, 1);
-  first.insert(first.end(), {std::byte{'A'}, std::byte{0}});
+  for (const char c : channel) first.push_back(static_cast<std::byte>(c));
+  first.push_back(std::byte{0});
   first.insert(first.end(), 100, std::byte{1});
   second.insert(second.end(), 0x900, std::byte{2});
   return {first, second};

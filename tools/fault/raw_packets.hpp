@@ -59,7 +59,7 @@ std::vector<Packet> hostile_packets(const std::string& channel, std::span<const 
 std::vector<Packet> hostile_packets(const LcmSettings& lcm);
 
 /// The beginning of a message in fragments, and a second fragment whose offset and size together
-/// pass 2^32: inside LCM 1.3.1 they end every process on the group that subscribes to anything.
-std::array<Packet, 2> fragments_that_end_subscribers();
+/// pass 2^32: inside LCM 1.3.1 they end every process that subscribes to this channel.
+std::array<Packet, 2> fragments_that_end_subscribers(const std::string& channel);
 
 }  // namespace softarm
