@@ -77,9 +77,8 @@ Packet HostilePackets::broken_header() {
     case 2:  // a name without end, or longer than names may be
       return lcm_packet(std::string(64 + below(200), static_cast<char>(1 + below(255))),
                         sample.bytes);
-    default: {  // any letters for a name
-      std::string channel(below(64), ' ');
-      for (char& c : channel) c = static_cast<char>(1 + below(255));
+    default: {  // any letter for a name; few names, for LCM keeps each it has ever seen
+      const std::string channel(below(64), static_cast<char>(1 + below(4) * 63));
       return lcm_packet(channel, sample.bytes);
     }
   }
