@@ -71,11 +71,10 @@ class MessageDecoding : public ::testing::Test {
   static inline Message into{};
 };
 
-using AllMessages =
-    ::testing::Types<mocap_frame_t, pressure_command_t, pressure_measurement_t,
-                     curvature_reference_t, operator_command_t, controller_status_t, plant_state_t,
-                     timing_t, tick_record_t, valves_status_t, deadman_t, rigid_transform_t,
-                     torque_command_t>;
+using AllMessages = ::testing::Types<mocap_frame_t, pressure_command_t, pressure_measurement_t,
+                                     curvature_reference_t, operator_command_t, controller_status_t,
+                                     plant_state_t, timing_t, tick_record_t, valves_status_t,
+                                     deadman_t, rigid_transform_t, torque_command_t>;
 class MessageName {
  public:
   template <class Message>
