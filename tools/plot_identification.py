@@ -56,7 +56,7 @@ def draw(directory):
                Line2D([], [], color=style.COMPONENT[1], label="simulated, y")]
     path = directory / "identification.png"
     style.finish(figure, path, f"Identification: residual {rms:.3g} mrad rms a component", handles)
-    return path
+    return f"{path}: residual {rms:.3g} mrad rms a component"
 
 
 def main():

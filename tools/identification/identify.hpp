@@ -1,6 +1,8 @@
 // A record to parameters: linear least squares for a start, then the simulated response.
 #pragma once
 
+#include <vector>
+
 #include "identification/linear_fit.hpp"
 #include "identification/refinement.hpp"
 
@@ -10,6 +12,8 @@ struct IdentifyOptions {
   double window_s = 0.2;       ///< of the smoothing for the start
   double longest_lag_s = 0.5;  ///< that the start considers
   RefinementOptions refinement;
+  /// Arms from which the search may start as well, if one is nearer than what least squares find.
+  std::vector<ArmHypothesis> near;
 };
 
 /// @throws std::runtime_error as `fit_linear` and `refine`

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 namespace softarm {
 
@@ -14,6 +15,16 @@ MotionRecord MotionRecord::part(double from_s, double to_s, double lead_s) const
   out.u_rad = u_rad.middleRows(first, out.time_s.size());
   out.input = input;
   out.scored_from_s = std::max(scored_from_s, from_s);
+  return out;
+}
+
+MotionRecord MotionRecord::thinned(double apart_s) const {
+  std::vector<Eigen::Index> kept;
+  for (Eigen::Index k = 0; k < time_s.size(); ++k)
+    if (kept.empty() || time_s[k] - time_s[kept.back()] >= apart_s) kept.push_back(k);
+  MotionRecord out = *this;
+  out.time_s = time_s(kept).eval();
+  out.u_rad = u_rad(kept, Eigen::all).eval();
   return out;
 }
 

@@ -20,6 +20,8 @@ struct MotionRecord {
 
   /// The frames from `from_s` until before `to_s`, whose simulation starts `lead_s` earlier.
   MotionRecord part(double from_s, double to_s, double lead_s) const;
+  /// Without the frames that come less than `apart_s` after the last one kept.
+  MotionRecord thinned(double apart_s) const;
 };
 
 /// What a first-order lag after a dead time makes of a track; exact for steps and straight lines.

@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <functional>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -19,10 +20,15 @@ enum class GainSharing {
 };
 
 struct FitChoice {
+  bool stiffness = true;     ///< false: as configured, where the record tells ratios only
+  bool damping = true;       ///< false: as configured
+  bool inertia = true;       ///< false: none, for motions so slow that it does not count
   bool per_segment = false;  ///< k and beta of every segment, instead of one for all as in VII-B1
   GainSharing gains = GainSharing::chamber;
-  bool gains_free = true;   ///< false: as configured (always with actuation by torque)
-  bool directions = false;  ///< into which direction a chamber pushes, too
+  bool gains_free = true;  ///< false: as configured (always with actuation by torque)
+  /// Into which direction a chamber pushes, too. Nothing is believed of its push then: the
+  /// configured gain is a scale.
+  bool directions = false;
   bool lag = true;
   bool delay = true;
   bool rest = false;
@@ -34,8 +40,10 @@ struct Parameter {
   std::string name;
   std::string unit;
   double scale = 1.0;
-  std::function<double(const ArmHypothesis&)> get;        ///< in its unit
-  std::function<void(ArmHypothesis&, double value)> set;  ///< in its unit
+  std::function<double(const ArmHypothesis&)> get;           ///< in its unit
+  std::function<void(ArmHypothesis&, double value)> set;     ///< in its unit
+  double lowest = -std::numeric_limits<double>::infinity();  ///< in its unit
+  double difference = 1e-5;                                  ///< over its scale: for sensitivities
 };
 
 class ParameterSet {
@@ -50,6 +58,7 @@ class ParameterSet {
 
   Eigen::VectorXd of(const ArmHypothesis& arm) const;  ///< over their scales
   Eigen::VectorXd believed() const { return of(start_); }
+  Eigen::VectorXd lowest() const;  ///< over their scales
   ArmHypothesis arm(const Eigen::VectorXd& x) const;
   /// Whether the arm is one: springs and damping that are not negative, no negative lag.
   bool possible(const Eigen::VectorXd& x) const;
@@ -57,7 +66,7 @@ class ParameterSet {
   bool linear(Eigen::Index i) const;
 
  private:
-  void add_impedance(bool per_segment);
+  void add_impedance(const FitChoice& choice);
   void add_gains(const FitChoice& choice);
   void add_times(const FitChoice& choice);
 

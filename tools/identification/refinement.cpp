@@ -15,11 +15,12 @@
 namespace softarm {
 namespace {
 
-constexpr double kDifference = 1e-5;      ///< of a parameter over its scale
 constexpr double kHeldAbove = 1.0;        ///< standard error of a combination that is not told
 constexpr double kNoiseFloor_rad = 1e-9;  ///< no motion capture is better
 constexpr int kWeightings = 3;
-constexpr double kNear = 0.02;  ///< sensitivities of a point so near serve for intervals
+constexpr double kSame = 1e-4;         ///< squared standard errors: a hundredth of one
+constexpr double kStillStable = 0.75;  ///< of the longest step, which is short of the stable one
+constexpr double kNear = 0.02;         ///< sensitivities of a point so near serve for intervals
 
 /// Frames as columns: all components of a frame stand together.
 class Comparison {
@@ -36,8 +37,16 @@ class Comparison {
 
   double step_s(const Eigen::VectorXd& x) const { return model_.longest_step_s(set_.arm(x)); }
 
+  /// A step that is stable at `x`: the one given as long as it is, so that the response stays a
+  /// smooth function of x. Zero where there is none.
+  double stable_step_s(const Eigen::VectorXd& x, double step_s) const {
+    if (!set_.possible(x)) return 0.0;
+    const double longest_s = model_.step_s(set_.arm(x)).value_or(0.0);
+    return longest_s < kStillStable * step_s ? kStillStable * longest_s : step_s;
+  }
+
   bool simulate(const Eigen::VectorXd& x, double step_s, Eigen::MatrixXd& u) const {
-    if (!set_.possible(x)) return false;
+    if (!(step_s > 0.0) || !set_.possible(x)) return false;
     Eigen::MatrixXd all;
     if (!model_.simulate(set_.arm(x), step_s, all)) return false;
     u = all.bottomRows(all.rows() - first_).transpose();
@@ -50,13 +59,14 @@ class Comparison {
     std::atomic<bool> good = true;
     in_parallel(static_cast<int>(set_.size()), threads, [&](int i) {
       Eigen::VectorXd moved = x;
-      moved[i] += kDifference;
+      const double difference = set_[i].difference;
+      moved[i] += difference;
       Eigen::MatrixXd u;
       if (!simulate(moved, step_s, u)) {
         good = false;
         return;
       }
-      J.col(i) = (u - at).reshaped() / kDifference;
+      J.col(i) = (u - at).reshaped() / difference;
     });
     return good;
   }
@@ -73,9 +83,14 @@ class Comparison {
   Eigen::Index first_ = 0;
 };
 
-/// L^-1 of the covariance L L' of the columns of `residual`.
-Eigen::MatrixXd whitener(const Eigen::MatrixXd& residual) {
+/// L^-1 of the covariance L L' of the columns of `residual`; its mean alone unless `weighted`.
+Eigen::MatrixXd whitener(const Eigen::MatrixXd& residual, bool weighted) {
   const Eigen::Index dof = residual.rows();
+  if (!weighted) {
+    const double squared = residual.squaredNorm() / static_cast<double>(residual.size());
+    return Eigen::MatrixXd::Identity(dof, dof) /
+           std::sqrt(squared + kNoiseFloor_rad * kNoiseFloor_rad);
+  }
   Eigen::MatrixXd covariance =
       residual * residual.transpose() / static_cast<double>(residual.cols());
   covariance.diagonal().array() +=
@@ -94,32 +109,32 @@ Eigen::MatrixXd whitened(const Eigen::MatrixXd& whiten, const Eigen::MatrixXd& J
 /// One search from one point, with one weighting.
 class Search {
  public:
-  Search(const Comparison& comparison, const Eigen::VectorXd& believed,
-         const RefinementOptions& options)
+  Search(const Comparison& comparison, const ParameterSet& set, const RefinementOptions& options)
       : comparison_(comparison),
-        believed_(believed),
+        believed_(set.believed()),
+        lowest_(set.lowest()),
         options_(options),
         measured_(comparison.measured()) {}
 
   void run(Refinement& out) {
-    const double step_s = comparison_.step_s(out.x);
+    step_s_ = comparison_.step_s(out.x);
     Eigen::MatrixXd u;
-    if (!comparison_.simulate(out.x, step_s, u))
+    if (!comparison_.simulate(out.x, step_s_, u))
       throw std::runtime_error(
           "the arm as believed has no bounded response to this input: check mass, stiffness and "
           "gains of the configuration");
     double damping = 1e-6;
     for (int weighting = 0; weighting < kWeightings; ++weighting) {
-      whiten_ = whitener(measured_ - u);
+      whiten_ = whitener(measured_ - u, options_.weighted);
       inflation_ = weighting == 0 ? 1.0 : variance_inflation((measured_ - u).transpose());
       out.converged = slow_ = false;
       length_ = std::numeric_limits<double>::infinity();
       while (out.rounds < options_.most_rounds && !out.converged) {
         ++out.rounds;
-        if (!improve(out, u, step_s, damping)) break;
+        if (!improve(out, u, damping)) break;
       }
     }
-    finish(out, u, step_s);
+    finish(out, u);
   }
 
  private:
@@ -144,18 +159,24 @@ class Search {
 
   /// The sensitivities of an earlier point serve as long as the search advances well with them:
   /// they cost as many simulations as there are parameters.
-  bool improve(Refinement& out, Eigen::MatrixXd& u, double step_s, double& damping) {
+  bool improve(Refinement& out, Eigen::MatrixXd& u, double& damping) {
     const bool fresh = J_.size() == 0 || slow_;
-    if (fresh && !comparison_.sensitivities(out.x, step_s, u, options_.threads, J_)) return false;
+    if (fresh && !comparison_.sensitivities(out.x, step_s_, u, options_.threads, J_)) return false;
     if (fresh) J_at_ = out.x;
-    const Eigen::MatrixXd J = whitened(whiten_, J_);
-    decompose(J, out);
+    Eigen::MatrixXd J = whitened(whiten_, J_);
     Eigen::VectorXd gradient = J.transpose() * (whiten_ * (measured_ - u)).reshaped() / inflation_;
     if (options_.prior > 0.0) gradient += (believed_ - out.x) / (options_.prior * options_.prior);
+    for (Eigen::Index i = 0; i < out.x.size(); ++i) {
+      if (out.x[i] > lowest_[i] || gradient[i] > 0.0) continue;
+      J.col(i).setZero();  // rests against its limit
+      gradient[i] = 0.0;
+    }
+    decompose(J, out);
     const Eigen::VectorXd squares = out.singular_values.array().square();
     Eigen::VectorXd along = out.combinations.transpose() * gradient;
     along.tail(out.held).setZero();
     const double before = cost(u, out.x);
+    double promised = 0.0;
     for (int attempt = 0; attempt < 12; ++attempt) {
       const Eigen::VectorXd inverse = (squares.array() + damping * squares.mean()).inverse();
       const Eigen::VectorXd step = out.combinations * along.cwiseProduct(inverse);
@@ -163,12 +184,14 @@ class Search {
       const double length = along.cwiseProduct(inverse).dot(along);  // in squared standard errors
       const bool small = length < 1e-6 || step.cwiseAbs().maxCoeff() < 1e-10;
       Eigen::MatrixXd tried;
-      const Eigen::VectorXd x = out.x + step;
-      if (comparison_.simulate(x, step_s, tried) && cost(tried, x) <= before) {
+      const Eigen::VectorXd x = (out.x + step).cwiseMax(lowest_);
+      const double stable_s = comparison_.stable_step_s(x, step_s_);
+      if (comparison_.simulate(x, stable_s, tried) && cost(tried, x) <= before) {
         out.x = x;
         u = tried;
+        step_s_ = stable_s;
         damping = std::max(1e-12, 0.1 * damping);
-        out.converged = small;
+        out.converged = small || (fresh && before - cost(u, x) < kSame);
         slow_ = length > 0.05 * length_;
         length_ = slow_ ? std::numeric_limits<double>::infinity() : length;
         tell(out);
@@ -182,8 +205,10 @@ class Search {
         slow_ = true;
         return true;  // with new sensitivities, then
       }
+      promised = std::max(promised, length);
       damping = std::max(1e-9, 10.0 * damping);
     }
+    out.converged = promised < kSame;  // recorded inputs have kinks
     return false;
   }
 
@@ -193,12 +218,12 @@ class Search {
   }
 
   /// Intervals and what the report shows.
-  void finish(Refinement& out, const Eigen::MatrixXd& u, double step_s) {
+  void finish(Refinement& out, const Eigen::MatrixXd& u) {
     const Eigen::MatrixXd residual = measured_ - u;
-    whiten_ = whitener(residual);
+    whiten_ = whitener(residual, options_.weighted);
     inflation_ = variance_inflation(residual.transpose());
     if ((out.x - J_at_).cwiseAbs().maxCoeff() > kNear &&
-        !comparison_.sensitivities(out.x, step_s, u, options_.threads, J_))
+        !comparison_.sensitivities(out.x, step_s_, u, options_.threads, J_))
       throw std::runtime_error("the response next to what was found is not bounded");
     const Eigen::MatrixXd J = whitened(whiten_, J_);
     decompose(J, out);
@@ -223,8 +248,9 @@ class Search {
   }
 
   const Comparison& comparison_;
-  Eigen::VectorXd believed_;
+  Eigen::VectorXd believed_, lowest_;
   const RefinementOptions& options_;
+  double step_s_ = 0.0;
   Eigen::MatrixXd measured_, whiten_;
   double inflation_ = 1.0;
   Eigen::MatrixXd J_;  ///< not whitened
@@ -255,7 +281,7 @@ Refinement refine(const ParameterSet& set, const MotionRecord& record, const Eig
   const Comparison comparison(set, record);
   Refinement out;
   out.x = start;
-  Search(comparison, set.believed(), options).run(out);
+  Search(comparison, set, options).run(out);
   Eigen::MatrixXd u;
   comparison.simulate(out.x, comparison.step_s(out.x), u);
   compare(comparison, u, out);

@@ -12,6 +12,8 @@ struct RefinementOptions {
   int most_rounds = 40;
   /// Standard deviation, in the parameters' scales, of what was believed before; 0: nothing was.
   double prior = 0.0;
+  /// false: every component weighs alike, so that the RMS itself is least (without a prior).
+  bool weighted = true;
   int threads = 1;
   std::function<void(const std::string&)> progress;  ///< may be empty
 };
@@ -42,7 +44,8 @@ struct Refinement {
 /// Minimises sum r' W r over frames, r = measured - simulated u, by Levenberg and Marquardt's
 /// method; W is the inverse of the residuals' own covariance over the components of a frame, found
 /// anew twice. Sensitivities are finite differences of the simulation. A combination of
-/// parameters whose standard error exceeds 1 (in their scales, hence 100 %) stays as it was.
+/// parameters whose standard error exceeds 1 (in their scales, hence 100 %) stays as it was. A
+/// parameter that would leave what is possible rests against its limit.
 /// The covariance is the sandwich (J'WJ)^-1 S (J'WJ)^-1, S that of the scores J'W r summed over
 /// time (see `sum_covariance`): it holds for noise that is filtered as for noise that is white.
 /// @throws std::runtime_error where no response can be simulated at `start`

@@ -4,7 +4,9 @@
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 
 #include "softarm/model/actuation_matrix.hpp"
@@ -92,6 +94,7 @@ class Motion {
   /// One step of length h; inputs at its begin, middle and end.
   bool step(double h, const Eigen::VectorXd& p0, const Eigen::VectorXd& p1,
             const Eigen::VectorXd& p2, Eigen::VectorXd& u, Eigen::VectorXd& v) {
+    if (!arm_.inertia) return creep(h, p0, p1, p2, u);
     if (!acceleration(u, v, p0, a1_)) return false;
     u2_ = u + 0.5 * h * v;
     v2_ = v + 0.5 * h * a1_;
@@ -105,6 +108,26 @@ class Motion {
     u += h / 6.0 * (v + 2.0 * v2_ + 2.0 * v3_ + v4_);
     v += h / 6.0 * (a1_ + 2.0 * a2_ + 2.0 * a3_ + a4_);
     return u.allFinite() && u.cwiseAbs().maxCoeff() < kLargest_rad;
+  }
+
+  /// The same without inertia.
+  bool creep(double h, const Eigen::VectorXd& p0, const Eigen::VectorXd& p1,
+             const Eigen::VectorXd& p2, Eigen::VectorXd& u) {
+    velocity(u, p0, a1_);
+    u2_ = u + 0.5 * h * a1_;
+    velocity(u2_, p1, a2_);
+    u3_ = u + 0.5 * h * a2_;
+    velocity(u3_, p1, a3_);
+    u4_ = u + h * a3_;
+    velocity(u4_, p2, a4_);
+    u += h / 6.0 * (a1_ + 2.0 * a2_ + 2.0 * a3_ + a4_);
+    return u.allFinite() && u.cwiseAbs().maxCoeff() < kLargest_rad;
+  }
+
+  void velocity(const Eigen::VectorXd& u, const Eigen::VectorXd& input, Eigen::VectorXd& v) {
+    imbalance(u, input, v);
+    for (Eigen::Index c = 0; c < v.size(); ++c)
+      v[c] /= -arm_.arm.segments[static_cast<std::size_t>(c / 2)].damping_nms_per_rad;
   }
 
   void reserve(Eigen::Index dof) {
@@ -161,29 +184,57 @@ void spring_force(const ArmHypothesis& arm, ConstVectorRef u, VectorRef force) {
   }
 }
 
-double ResponseModel::longest_step_s(const ArmHypothesis& arm) const {
+double ResponseModel::fastest_1ps(const ArmHypothesis& arm) const {
   const Eigen::Index dof = arm.arm.dof();
   DynamicsWorkspace workspace(arm.arm);
-  Eigen::MatrixXd B(dof, dof), impedance = Eigen::MatrixXd::Zero(dof, dof);
-  inertia_matrix(arm.arm, workspace, Eigen::VectorXd::Zero(dof), B);
-  double stiffness = 0.0;
-  for (Eigen::Index i = 0; i < arm.arm.size(); ++i) {
-    const SegmentParameters& segment = arm.arm.segments[static_cast<std::size_t>(i)];
-    impedance.diagonal().segment<2>(2 * i).setConstant(segment.damping_nms_per_rad);
-    stiffness = std::max(stiffness, segment.stiffness_nm_per_rad);
+  double bend_rad = 0.0;  // where the cubic springs are stiffest
+  if (arm.cubic_nm_per_rad3 > 0.0)
+    for (Eigen::Index i = 0; i < record_.u_rad.cols() / 2; ++i)
+      bend_rad = std::max(bend_rad, record_.u_rad.middleCols<2>(2 * i).rowwise().norm().maxCoeff());
+  Eigen::VectorXd damping(dof), springs(dof);
+  for (Eigen::Index c = 0; c < dof; ++c) {
+    const SegmentParameters& segment = arm.arm.segments[static_cast<std::size_t>(c / 2)];
+    damping[c] = segment.damping_nms_per_rad;
+    springs[c] = segment.stiffness_nm_per_rad + 3.0 * arm.cubic_nm_per_rad3 * bend_rad * bend_rad;
   }
+  const Eigen::VectorXd straight = Eigen::VectorXd::Zero(dof);
+  if (!arm.inertia) {
+    Eigen::MatrixXd stiffness = springs.asDiagonal();
+    Eigen::VectorXd moved = straight, weight(dof);
+    for (Eigen::Index j = 0; j < dof; ++j) {
+      moved[j] = 1e-4;
+      inverse_dynamics(arm.arm, workspace, moved, moved, moved, moved,
+                       {.inertia = false, .coriolis = false, .gravity = true}, weight);
+      stiffness.col(j) += weight / 1e-4;
+      moved[j] = 0.0;
+    }
+    const double largest = stiffness.cwiseAbs().rowwise().sum().maxCoeff();  // >= any eigenvalue
+    return damping.minCoeff() > 0.0 ? largest / damping.minCoeff()
+                                    : std::numeric_limits<double>::infinity();
+  }
+  Eigen::MatrixXd B(dof, dof);
+  inertia_matrix(arm.arm, workspace, straight, B);
   const double smallest =
       Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(B, Eigen::EigenvaluesOnly).eigenvalues()[0];
+  const Eigen::MatrixXd impedance = damping.asDiagonal();
   const double damped = Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd>(
                             impedance, B, Eigen::EigenvaluesOnly)
                             .eigenvalues()[dof - 1];
-  const double rate = std::max(damped, std::sqrt(stiffness / smallest));
-  if (!(rate < kFastest_1ps))
-    throw std::runtime_error(fmt::format(
-        "the fastest mode of the arm is at {:.3g} 1/s: its response cannot be simulated in "
-        "reasonable time; arm.mass_model: distributed has slower modes, --linear needs none",
-        rate));
+  return std::max(damped, std::sqrt(springs.maxCoeff() / smallest));
+}
+
+std::optional<double> ResponseModel::step_s(const ArmHypothesis& arm) const {
+  const double rate = fastest_1ps(arm);
+  if (!(rate < kFastest_1ps)) return std::nullopt;
   return kStep / rate;
+}
+
+double ResponseModel::longest_step_s(const ArmHypothesis& arm) const {
+  if (const std::optional<double> step = step_s(arm)) return *step;
+  throw std::runtime_error(fmt::format(
+      "the fastest mode of the arm is at {:.3g} 1/s: its response cannot be simulated in "
+      "reasonable time; arm.mass_model: distributed has slower modes, --linear needs none",
+      fastest_1ps(arm)));
 }
 
 bool ResponseModel::simulate(const ArmHypothesis& arm, double longest_step_s,

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 
 #include "identification/motion_record.hpp"
 #include "softarm/config/experiment.hpp"
@@ -18,6 +19,7 @@ struct ArmHypothesis {
   std::vector<int> segment_of;  ///< of every input
   Eigen::VectorXd rest_rad;     ///< 2n: where the springs rest
   double cubic_nm_per_rad3 = 0.0;
+  bool inertia = true;   ///< false: damping alone resists motion, u' = D^-1 (push - springs - G)
   double lag_s = 0.0;    ///< first order, from the input to what pushes
   double delay_s = 0.0;  ///< before that
 };
@@ -41,7 +43,9 @@ class ResponseModel {
   explicit ResponseModel(const MotionRecord& record) : record_(record) {}
 
   /// The longest step with which the arm is stable and accurate, from its fastest mode straight and
-  /// at rest. @throws std::runtime_error where that would take too long (point masses)
+  /// at rest; nothing where that would take too long.
+  std::optional<double> step_s(const ArmHypothesis& arm) const;
+  /// The same. @throws std::runtime_error where that would take too long (point masses)
   double longest_step_s(const ArmHypothesis& arm) const;
 
   /// u at every frame, in rows, from the static equilibrium under the first input. False where the
@@ -49,6 +53,8 @@ class ResponseModel {
   bool simulate(const ArmHypothesis& arm, double longest_step_s, Eigen::MatrixXd& u) const;
 
  private:
+  double fastest_1ps(const ArmHypothesis& arm) const;
+
   const MotionRecord& record_;
 };
 

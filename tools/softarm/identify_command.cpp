@@ -14,6 +14,7 @@
 #include "identification/live_experiment.hpp"
 #include "identification/log_record.hpp"
 #include "identification/model_comparison.hpp"
+#include "identification/residual_parts.hpp"
 #include "program.hpp"
 #include "progress.hpp"
 #include "signals.hpp"
@@ -30,9 +31,10 @@ struct Command {
   StepPlan plan;
   CoverageStudy study;
   IdentifyOptions options;
-  double from_s = 0.0, to_s = 0.0, skip_s = 0.0;
+  double from_s = 0.0, to_s = 0.0, skip_s = 0.0, apart_s = 0.0;
   std::uint64_t seed = 0;
   bool has_seed = false, has_hold = false, no_lag = false, no_delay = false;
+  bool no_stiffness = false, no_damping = false, no_inertia = false;
   bool linear = false, predict = false, compare = false, coverage = false, live = false;
 };
 
@@ -58,6 +60,7 @@ MotionRecord record_of(const Experiment& experiment, const Command& command) {
   const double to_s = command.to_s > 0.0 ? std::min(command.to_s, end_s) : end_s;
   record = record.part(command.from_s, to_s, 0.0);
   record.scored_from_s = command.from_s + command.skip_s;
+  if (command.apart_s > 0.0) record = record.thinned(command.apart_s);
   return record;
 }
 
@@ -106,6 +109,9 @@ int identify(Command& command) {
   if (!command.has_hold) command.plan.hold_s = experiment.identification.hold_s;
   command.choice.lag = !command.no_lag;
   command.choice.delay = !command.no_delay;
+  command.choice.stiffness = !command.no_stiffness;
+  command.choice.damping = !command.no_damping;
+  command.choice.inertia = !command.no_inertia;
   if (command.coverage) return print_coverage(experiment, command);
 
   const MotionRecord record = record_of(experiment, command);
@@ -120,13 +126,17 @@ int identify(Command& command) {
   command.options.refinement.threads = threads();
   command.options.refinement.progress = [&](const std::string& text) { progress.update(text); };
   if (command.compare) {
-    fmt::print("{}", comparison_text(
-                         compare_models(experiment, record, command.choice, command.options,
-                                        [&](const std::string& text) { progress.update(text); })));
+    const ModelComparison comparison =
+        compare_models(experiment, record, command.choice, command.options,
+                       [&](const std::string& text) { progress.update(text); });
+    const Refinement& fit = comparison.trials.back().result.whole;
+    fmt::print("{}\nas asked, on the whole record:\n{}{}", comparison_text(comparison),
+               fit_table(set, fit), residual_parts_text(residual_parts(record, fit)));
+    write_findings(experiment, command, set, fit);
     return kExitOk;
   }
   if (command.predict) {
-    const Refinement fit = predict(set, record, set.believed());
+    const Refinement fit = predict(set, record, set.of(believed(experiment)));
     fmt::print(
         "{} predicts u to {:.4g} mrad rms a component; the motion's own is {:.4g} mrad rms "
         "about its mean\n",
@@ -136,6 +146,7 @@ int identify(Command& command) {
   }
   const Refinement fit = softarm::identify(set, record, command.options);
   fmt::print("{}{}", fit_table(set, fit), conditioning_text(set, fit));
+  if (!command.log.empty()) fmt::print("{}", residual_parts_text(residual_parts(record, fit)));
   write_findings(experiment, command, set, fit);
   return kExitOk;
 }
@@ -156,6 +167,8 @@ void add_source_options(CLI::App& command, Command& options) {
   command.add_option("--from", options.from_s, "begin in the log, s after its first frame");
   command.add_option("--to", options.to_s, "end in the log (default: its end)");
   command.add_option("--skip", options.skip_s, "simulate so many s before comparing");
+  command.add_option("--apart", options.apart_s, "take frames of the log at least so many s apart")
+      ->check(CLI::Range(0.0, 10.0));
   command
       .add_option("--bend", options.plan.bend_rad,
                   "with actuation by torque: largest step, as the bend in rad that the "
@@ -175,6 +188,12 @@ void add_choice_options(CLI::App& command, Command& options) {
       .add_option("--gains", options.choice.gains,
                   "gains of their own for: arm, side, segment or (default) chamber")
       ->transform(CLI::CheckedTransformer(sharing));
+  command.add_flag("--no-stiffness", options.no_stiffness,
+                   "k as configured: for slow motion, which tells ratios only");
+  command.add_flag("--no-damping", options.no_damping, "beta as configured");
+  command.add_flag("--no-inertia", options.no_inertia,
+                   "leave inertia out, for motions so slow that it does not count: much quicker "
+                   "where beta is large");
   command.add_flag("--no-lag", options.no_lag, "the lag is identification.lag_s");
   command.add_flag("--no-delay", options.no_delay, "the delay is identification.delay_s");
   command.add_flag("--rest", options.choice.rest, "seek where the springs rest");
@@ -206,7 +225,7 @@ void add_identify_command(CLI::App& app) {
   command->add_flag("--predict", options->predict,
                     "identify nothing: how well does CONFIG predict the motion?");
   command->add_flag("--compare", options->compare,
-                    "what each term more buys, on the whole and between the halves");
+                    "what each term more buys, on the whole record and from half to half");
   auto* hold = command->add_option("--hold", options->plan.hold_s, "time between steps in s")
                    ->check(CLI::Range(0.1, 100.0));
   command

@@ -87,5 +87,20 @@ TEST(MotionRecord, PartKeepsItsLead) {
   EXPECT_NEAR(part.u_rad(0, 0), 3.0, 1e-9);
 }
 
+TEST(MotionRecord, ThinnedKeepsFramesApart) {
+  MotionRecord record;
+  record.time_s.resize(7);
+  record.time_s << 0.0, 0.01, 0.02, 0.05, 0.3, 0.34, 0.36;  // a burst, a gap, a burst
+  record.u_rad = 2.0 * record.time_s;
+  record.input = track(true);
+  record.scored_from_s = 0.1;
+  const MotionRecord thin = record.thinned(0.05);
+  ASSERT_EQ(thin.time_s.size(), 4);
+  EXPECT_EQ(thin.time_s, Eigen::Vector4d(0.0, 0.05, 0.3, 0.36));
+  EXPECT_EQ(thin.u_rad.col(0), 2.0 * thin.time_s);
+  EXPECT_EQ(thin.scored_from_s, 0.1);
+  EXPECT_EQ(thin.input.time_s, record.input.time_s);
+}
+
 }  // namespace
 }  // namespace softarm
