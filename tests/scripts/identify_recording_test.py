@@ -92,14 +92,13 @@ class Recording(unittest.TestCase):
             text = (self.folder / "out" / source / "table.txt").read_text(encoding="utf-8")
             rows[source] = {name: [float(x) for x in errors]
                             for name, *errors in re.findall(r"^(\S.*?) +\d+ +([\d.]+) +([\d.]+) +([\d.]+)(?:  NOT CONVERGED)?$", text, re.MULTILINE)}
-            motion = float(re.search(r"own about its mean: ([\d.]+) mrad", text).group(1))
             self.assertEqual(len(rows[source]), 9, text)
             self.assertGreater((self.folder / "out" / source / "identification.png").stat().st_size, 10000)
         # From measured pressures the model is the arm: what is left is the noise, in the halves that were not fitted, too.
         noise_mrad = 1e3 * NOISE_RAD
         for error in rows["measured"]["(16): gains, beta"]:
             self.assertLess(error, 1.5 * noise_mrad)
-        self.assertGreater(rows["measured"]["gains; no damping"][0], 0.1 * motion)
+        self.assertGreater(rows["measured"]["gains; no damping"][0], 10 * noise_mrad)
         beta = re.search(r"^damping beta +([\d.]+)", (self.folder / "out/measured/table.txt").read_text(encoding="utf-8"), re.MULTILINE)
         gravity = 0.3 * 9.81 * LENGTH_M / 12  # N m/rad, of the configured mass, beside k = 1
         self.assertAlmostEqual(float(beta.group(1)), BETA_OVER_K_S * (1 + gravity), delta=0.03)
