@@ -127,7 +127,7 @@ Finding check_rest_pose(const Experiment& experiment, const MeanPoses& rest) {
   if (!wrong.empty()) {
     out.verdict = Verdict::fail;
     out.text = fmt::format("{}", fmt::join(wrong, "; "));
-    out.cure = "say how the frames sit on their plates (daemon.bodies.base_plate, segment_plates)";
+    out.cure = "softarm calibrate, with the arm at rest (daemon.bodies.base_plate, segment_plates)";
   }
   return out;
 }

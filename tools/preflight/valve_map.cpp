@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "live/commander.hpp"
 #include "preflight/statics.hpp"
 
 namespace softarm {
@@ -170,8 +171,11 @@ Finding check_valve_map(const Experiment& experiment, const Observation& seen) {
     if (std::string problem = one_problem(experiment, each); !problem.empty())
       problems.push_back(std::move(problem));
   if (problems.empty()) {
-    out.verdict = Verdict::pass;
+    const auto chambers = static_cast<std::size_t>(chamber_count(experiment.actuation));
+    out.verdict = responses.size() == chambers ? Verdict::pass : Verdict::not_checked;
     out.text = strength_text(responses);
+    if (responses.size() < chambers)
+      out.text += fmt::format("; {} were not filled", chambers - responses.size());
     return out;
   }
   out.verdict = Verdict::fail;

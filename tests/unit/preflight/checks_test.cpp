@@ -286,6 +286,15 @@ TEST(Preflight, ValveMap) {
       fails(checked(arm, exchanged), "valve map", "valves.order: [4, 5, 6, 7, 0, 1, 2, 3]"));
 }
 
+TEST(Preflight, PulsesThatEndedEarlyProveNothing) {
+  const Experiment arm = hanging_arm(2);
+  Observation seen = observed(arm, true);
+  seen.pulses.resize(3);
+  const std::vector<Finding> all = checked(arm, seen);
+  EXPECT_EQ(finding(all, "valve map").verdict, Verdict::not_checked) << report_text(all);
+  EXPECT_EQ(finding(all, "leaks").verdict, Verdict::not_checked) << report_text(all);
+}
+
 TEST(Preflight, AChamberWithoutAirAndAnArmWithout) {
   Experiment arm = hanging_arm(2);
   const Experiment believed = arm;
