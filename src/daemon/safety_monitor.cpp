@@ -159,16 +159,30 @@ SafetyMonitor::SafetyMonitor(const SafetySettings& settings, double control_peri
       thresholds_(resolve_thresholds(settings, control_period_s)),
       armed_(settings.arming == Arming::automatic) {}
 
+/// LCM drops the newest messages when a queue is full: after a stop longer than valves may be
+/// silent their newest measurement looks old although they never were. Where nothing was heard
+/// since the stop before, another one changes nothing.
+void SafetyMonitor::note_stop(const SafetyInput& input) noexcept {
+  const bool stopped =
+      mode_ != Mode::init && input.now_ns - previous_tick_ns_ > thresholds_.valve_silence_ns;
+  if (stopped && input.newest_measurement_ns > listening_since_ns_)
+    listening_since_ns_ = input.now_ns;
+}
+
 CauseRule SafetyMonitor::worst_cause(const SafetyInput& input) const noexcept {
   const bool ticked_before = mode_ != Mode::init;
-  const Evidence evidence{.input = input,
-                          .settings = settings_,
-                          .thresholds = thresholds_,
-                          .mode = mode_,
-                          .frame_age_ns = age(input.now_ns, input.newest_capture_ns),
-                          .tick_gap_ns = ticked_before ? input.now_ns - previous_tick_ns_ : 0,
-                          .measurement_age_ns = age(input.now_ns, input.newest_measurement_ns),
-                          .go_age_ns = age(input.now_ns, input.newest_go_ns)};
+  const Evidence evidence{
+      .input = input,
+      .settings = settings_,
+      .thresholds = thresholds_,
+      .mode = mode_,
+      .frame_age_ns = age(input.now_ns, input.newest_capture_ns),
+      .tick_gap_ns = ticked_before ? input.now_ns - previous_tick_ns_ : 0,
+      .measurement_age_ns =
+          input.newest_measurement_ns == SafetyInput::kNever
+              ? std::numeric_limits<std::int64_t>::max()
+              : input.now_ns - std::max(input.newest_measurement_ns, listening_since_ns_),
+      .go_age_ns = age(input.now_ns, input.newest_go_ns)};
   for (const Cause& cause : kCauses)
     if (cause.present(evidence)) return cause.rule;
   return {Reason::none, Mode::active, Clearance::good_frames};
@@ -204,6 +218,7 @@ void SafetyMonitor::try_to_activate(const SafetyInput& input, Reason otherwise) 
 }
 
 Mode SafetyMonitor::step(const SafetyInput& input) noexcept {
+  note_stop(input);
   const CauseRule worst = worst_cause(input);
   take_operator_requests(input, worst.demands);
   previous_tick_ns_ = input.now_ns;
@@ -212,10 +227,12 @@ Mode SafetyMonitor::step(const SafetyInput& input) noexcept {
     reason_ = Reason::waiting_for_frames;
   }
 
-  // A run of good frames is one without a cause, a rejection or a gap, and begins anew with the arm
-  // vented: until then it is moving.
+  // A run of good frames is one without a cause, a rejection, a gap or silent valves, and begins
+  // anew with the arm vented: until then it is moving.
   const bool still_venting = mode_ >= Mode::vent && !input.fully_vented;
-  if (worst.demands > Mode::active || input.bad_frames > 0 || still_venting) {
+  const bool unheard = settings_.valve_readback && listening_since_ns_ != SafetyInput::kNever &&
+                       input.newest_measurement_ns <= listening_since_ns_;
+  if (worst.demands > Mode::active || input.bad_frames > 0 || still_venting || unheard) {
     good_in_a_row_ = 0;
   } else {
     good_in_a_row_ = std::min(good_in_a_row_ + input.good_frames, settings_.good_frames);

@@ -103,8 +103,10 @@ struct SafetyInput {
 };
 
 /// Reads no clock, allocates nothing, throws nothing. Transitions follow the severity of the causes
-/// present: the most severe wins. While nothing is pressurised (WAIT_FRAMES) a cause that demands
-/// HOLD or VENT only keeps the arm from becoming active.
+/// present: the most severe wins. Valves count as silent for as long as the monitor was stepped and
+/// did not hear them: what arrived while the daemon was stopped may have been dropped. After such a
+/// stop no frame is good before they have been heard again. While nothing is pressurised
+/// (WAIT_FRAMES) a cause that demands HOLD or VENT only keeps the arm from becoming active.
 class SafetyMonitor {
  public:
   SafetyMonitor(const SafetySettings& settings, double control_period_s) noexcept;
@@ -117,6 +119,7 @@ class SafetyMonitor {
   const SafetyThresholds& thresholds() const noexcept { return thresholds_; }
 
  private:
+  void note_stop(const SafetyInput& input) noexcept;
   CauseRule worst_cause(const SafetyInput& input) const noexcept;
   void take_operator_requests(const SafetyInput& input, Mode demanded) noexcept;
   void enter(const CauseRule& cause) noexcept;
@@ -129,6 +132,7 @@ class SafetyMonitor {
   bool armed_;
   int good_in_a_row_ = 0;
   std::int64_t previous_tick_ns_ = 0;
+  std::int64_t listening_since_ns_ = SafetyInput::kNever;  ///< end of the last stop, for the valves
 };
 
 }  // namespace softarm

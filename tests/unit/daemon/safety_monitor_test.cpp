@@ -170,6 +170,56 @@ TEST(SafetyMonitor, SilentValvesAreALatchedFault) {
   EXPECT_EQ(bench.tick(), Mode::active);
 }
 
+/// Stops the daemon for 500 ms. LCM keeps the oldest messages: of the valves' it brings those of
+/// the stop's first 32 ms.
+Mode stop_and_go_on(Bench& bench) {
+  bench.input.newest_measurement_ns = bench.input.now_ns + 32 * kMs;
+  bench.input.now_ns += 500 * kMs;
+  bench.input.good_frames = 0;
+  return bench.monitor.step(bench.input);
+}
+
+TEST(SafetyMonitor, WhatTheDaemonCouldNotHearIsNoSilence) {
+  Bench bench(Arming::automatic, true);
+  bench.activate();
+  EXPECT_EQ(stop_and_go_on(bench), Mode::vent);
+  EXPECT_EQ(bench.monitor.reason(), Reason::time_gap);
+  EXPECT_EQ(bench.run(10), Mode::vent);
+  bench.input.fully_vented = true;
+  EXPECT_EQ(bench.run(49), Mode::vent);
+  EXPECT_EQ(bench.tick(), Mode::active);
+}
+
+TEST(SafetyMonitor, ValvesThatFellSilentDuringAStopAreNotedAfterIt) {
+  Bench bench(Arming::automatic, true);
+  bench.activate();
+  EXPECT_EQ(stop_and_go_on(bench), Mode::vent);
+  const std::int64_t heard_ns = bench.input.newest_measurement_ns;
+  const std::int64_t goes_on_ns = bench.input.now_ns;
+  const auto tick = [&] {
+    bench.input.now_ns += 2 * kMs;
+    bench.input.good_frames = 10;
+    bench.input.newest_capture_ns = bench.input.now_ns;
+    bench.input.newest_measurement_ns = heard_ns;
+    return bench.monitor.step(bench.input);
+  };
+  bench.input.fully_vented = true;
+  while (bench.input.now_ns < goes_on_ns + 100 * kMs)
+    ASSERT_EQ(tick(), Mode::vent) << "not ACTIVE before the valves have been heard";
+  EXPECT_EQ(tick(), Mode::vent);
+  EXPECT_EQ(bench.monitor.reason(), Reason::valves_silent);
+  bench.input.fully_vented = false;
+  EXPECT_EQ(tick(), Mode::fault) << "where there is pressure";
+
+  // One stop after the other does not hide them either.
+  Bench again(Arming::automatic, true);
+  again.activate();
+  EXPECT_EQ(stop_and_go_on(again), Mode::vent);
+  again.input.now_ns += 500 * kMs;
+  EXPECT_EQ(again.monitor.step(again.input), Mode::fault);
+  EXPECT_EQ(again.monitor.reason(), Reason::valves_silent);
+}
+
 TEST(SafetyMonitor, TheMoreSevereCauseWins) {
   Bench bench;
   bench.activate();
