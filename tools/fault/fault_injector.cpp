@@ -141,6 +141,8 @@ void FaultInjector::spoil_poses(mocap_frame_t& frame) {
 void FaultInjector::take(const mocap_frame_t& sent, std::int64_t now_ns) {
   ++taken_;
   mocap_frame_t frame = sent;
+  if (sent.frame_number < newest_number_) number_offset_ = 0;  // the sender itself begins anew
+  newest_number_ = sent.frame_number;
   if (std::exchange(restart_, false)) number_offset_ = 1 - frame.frame_number;
   frame.frame_number += number_offset_;
   if (fault_.kind == FaultKind::stop) return;

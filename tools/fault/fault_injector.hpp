@@ -86,7 +86,7 @@ class FaultInjector {
   Fault fault_;
   std::deque<Waiting> waiting_;
   std::optional<softarm_messages::mocap_frame_t> kept_;  // frozen, or overtaken
-  std::int64_t number_offset_ = 0;
+  std::int64_t number_offset_ = 0, newest_number_ = 0;
   bool restart_ = false;
   std::int64_t taken_ = 0;
 };

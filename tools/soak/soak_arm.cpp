@@ -17,6 +17,7 @@ constexpr std::int64_t kReferencePeriod_ns = kSecond_ns / 100;
 constexpr std::int64_t kGoPeriod_ns = kSecond_ns / 25;
 constexpr double kMostTheta_rad = 0.8;
 constexpr int kPoses = 100;
+constexpr int kReferenceLimited = 1 << 2;  ///< of the status' flags
 /// Of the limit of a step, for its rounding to float on the wire.
 constexpr double kRounding = 1.00001;
 
@@ -84,7 +85,9 @@ void SoakArm::take_status(const ReceivedMessage& packet) {
   }
   const bool begins = mode() != Mode::active && static_cast<Mode>(decoded_.mode) == Mode::active;
   status_ = decoded_;
-  if (begins) begin_motion();
+  const bool refused = mode() == Mode::active && (status_.flags & kReferenceLimited) != 0 &&
+                       monotonic_now_ns() - motion_began_ns_ > kSecond_ns;
+  if (begins || refused) begin_motion();
   for (std::size_t i = 0; i < std::min(followed_.size(), status_.reference_u_rad.size()); ++i) {
     const auto& u = status_.reference_u_rad[i];
     const std::array<double, 2> now{static_cast<double>(u[0]), static_cast<double>(u[1])};
@@ -137,13 +140,16 @@ void SoakArm::speak(std::int64_t now_ns) {
   }
 }
 
-/// A live reference further than max_step_rad from where the daemon's is would be refused.
+/// A live reference further than max_step_rad from the daemon's own is refused: so at first, where
+/// the arm is, and where a busy machine kept ours from being heard for a while.
 void SoakArm::begin_motion() {
+  const auto& from = status_.reference_u_rad.empty() ? status_.u_rad : status_.reference_u_rad;
   SegmentVector u = SegmentVector::Zero(2 * segments_), rest = u;
-  for (int i = 0; i < segments_ && i < std::ssize(status_.u_rad); ++i)
-    for (int axis = 0; axis < 2; ++axis)
-      u[2 * i + axis] = static_cast<double>(
-          status_.u_rad[static_cast<std::size_t>(i)][static_cast<std::size_t>(axis)]);
+  for (std::size_t i = 0; i < std::min(followed_.size(), from.size()); ++i)
+    for (const int axis : {0, 1})
+      u[2 * static_cast<int>(i) + axis] =
+          static_cast<double>(from[i][static_cast<std::size_t>(axis)]);
+  motion_began_ns_ = monotonic_now_ns();
   reference_.emplace(
       random_reference(segments_, std::min(kMostTheta_rad, 0.5 * control_.max_theta_rad), kPoses,
                        ++seed_),

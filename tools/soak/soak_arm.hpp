@@ -81,7 +81,7 @@ class SoakArm {
   std::optional<Reference> reference_;  ///< since the daemon has been ACTIVE for the first time
   ReferenceSample sample_;
   std::vector<std::array<double, 2>> followed_;  ///< u of the daemon's reference, rad
-  std::int64_t next_reference_ns_, next_go_ns_;
+  std::int64_t next_reference_ns_, next_go_ns_, motion_began_ns_ = 0;
   std::int64_t sequence_;
   DeadMan dead_man_ = DeadMan::go;
   std::set<std::pair<Mode, Reason>> seen_;

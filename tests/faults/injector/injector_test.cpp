@@ -118,6 +118,24 @@ TEST_F(Injector, DelaysInOrderAndFreezesThePoses) {
   EXPECT_EQ(message.bodies[3].position_m[0], before);
 }
 
+TEST_F(Injector, NumbersBeginAnewAlsoAfterTheSenderItselfDid) {
+  FaultInjector injector;
+  softarm_messages::mocap_frame_t message;
+  const auto number_of = [&](std::int64_t number) {
+    injector.take(sent(number), 0);
+    EXPECT_TRUE(injector.next(0, message));
+    return message.frame_number;
+  };
+  number_of(5000);
+  injector.set(*find_fault("restart"));
+  EXPECT_EQ(number_of(5001), 1);
+  EXPECT_EQ(number_of(5002), 2);
+  EXPECT_EQ(number_of(1), 1) << "another sender";
+  EXPECT_EQ(number_of(300), 300);
+  injector.set(*find_fault("restart"));
+  EXPECT_EQ(number_of(301), 1) << "numbers go back, not on from below zero";
+}
+
 TEST_F(Injector, SpoilsPressures) {
   FaultInjector injector;
   softarm_messages::pressure_measurement_t measured{};
