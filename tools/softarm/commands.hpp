@@ -15,6 +15,10 @@ void add_bench_control_commands(CLI::App& group);
 /// softarm bench plant [--json] [--duration S] [--rounds N]: added to `softarm bench`
 void add_bench_plant_command(CLI::App& group);
 
+/// softarm bench loop [--json] [--seconds S] [--rate HZ] [--busy N] [--cpu N] [CONFIG]: added to
+/// `softarm bench`
+void add_bench_loop_command(CLI::App& group);
+
 /// softarm calibrate CONFIG [--duration S] [-o FILE] [--base plate|arm]
 void add_calibrate_command(CLI::App& app);
 
