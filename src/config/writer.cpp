@@ -47,7 +47,7 @@ std::string shape_doc(const Shape& shape) {
   }
 }
 
-std::string quoted(const std::string& text) {
+std::string in_quotes(const std::string& text) {
   std::string out = "\"";
   for (const char c : text) {
     if (c == '"' || c == '\\') out += '\\';
@@ -146,7 +146,7 @@ void ExperimentWriter::flag(const Field& field, bool& value) {
 }
 
 void ExperimentWriter::text(const Field& field, std::string& value) {
-  entry(field, quoted(value), "text");
+  entry(field, in_quotes(value), "text");
 }
 
 void ExperimentWriter::choice(const Field& field, std::span<const char* const> names, int& index) {

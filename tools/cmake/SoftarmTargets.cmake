@@ -3,6 +3,8 @@
 # softarm_tests(LABEL ROOM [ALONE] [SLOW FILTER] DEPENDS ...): one test program from every *_test.cpp in the folder ROOM;
 # ALONE for tests in real time, which nothing may run beside; those whose names FILTER fits get the label slow instead.
 
+include(SoftarmHeaders)
+
 add_library(softarm_options INTERFACE)
 target_compile_features(softarm_options INTERFACE cxx_std_20)
 target_compile_options(softarm_options INTERFACE -Wall -Wextra -Wconversion -Wshadow -Wno-psabi)
@@ -33,6 +35,7 @@ function(softarm_room name)
   target_compile_features(softarm_${name} PUBLIC cxx_std_20)
   target_link_libraries(softarm_${name} PUBLIC ${ROOM_DEPENDS} PRIVATE ${ROOM_PRIVATE_DEPENDS} $<BUILD_INTERFACE:softarm_options>)
   set_property(GLOBAL APPEND PROPERTY SOFTARM_ROOMS softarm_${name})
+  softarm_precompile(room softarm_${name})
 endfunction()
 
 function(softarm_program name)
@@ -40,6 +43,7 @@ function(softarm_program name)
   add_executable(${name} ${PROGRAM_UNPARSED_ARGUMENTS})
   target_include_directories(${name} PRIVATE ${PROJECT_SOURCE_DIR}/src ${PROJECT_SOURCE_DIR}/tools)
   target_link_libraries(${name} PRIVATE ${PROGRAM_DEPENDS} softarm_options)
+  softarm_precompile(program ${name})
   install(TARGETS ${name} RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
 endfunction()
 
@@ -55,6 +59,7 @@ function(softarm_tests label room)
   target_link_libraries(${target} PRIVATE ${TESTS_DEPENDS} GTest::gtest_main softarm_options)
   target_compile_definitions(${target} PRIVATE
     SOFTARM_SOURCE_DIR="${PROJECT_SOURCE_DIR}" SOFTARM_BINARY_DIR="${PROJECT_BINARY_DIR}")
+  softarm_precompile(test ${target})
   set(usual "*")
   if(TESTS_SLOW)
     set(usual "-${TESTS_SLOW}")

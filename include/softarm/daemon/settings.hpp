@@ -73,7 +73,9 @@ enum class MocapSourceKind {
   optitrack,       ///< optitrack_frame_t
   rigid_transform  ///< rigid_transform_t, one channel a body: lcm.mocap_channel, _, its name
 };
+/// In which order the four numbers of a quaternion are sent.
 enum class QuaternionOrder { xyzw, wxyz };
+/// Of positions as they are sent.
 enum class LengthUnit { metre, millimetre };
 
 /// What a frame's numbers mean.

@@ -16,6 +16,7 @@ namespace softarm {
 /// beginning. Frames are numbered from 1, for their sender does not. Allocates nothing.
 class FrameAssembler {
  public:
+  /// A body waits with the frame under way, has begun one, or was dropped.
   enum class Outcome { waiting, begun, dropped };
 
   /// @param segments their ends are bodies 1 .. segments; body 0 is the base

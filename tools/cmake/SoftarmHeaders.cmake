@@ -1,0 +1,29 @@
+# softarm_precompile(KIND TARGETS...): with SOFTARM_PRECOMPILED_HEADERS the heavy headers of other projects are compiled once a
+# KIND (room, program or test) instead of once a file: a third of the time of a first build. Every file includes what it
+# uses all the same: the sanitizers' and the debugging presets build without.
+option(SOFTARM_PRECOMPILED_HEADERS "Compile the headers of Eigen, fmt, CLI11 and GoogleTest once, not once a file" OFF)
+
+set(SOFTARM_ROOM_HEADERS
+  <Eigen/Core> <Eigen/Geometry> <fmt/format.h> <algorithm> <array> <cmath> <filesystem> <functional> <limits> <memory> <numbers>
+  <optional> <span> <stdexcept> <string> <vector>)
+set(SOFTARM_PROGRAM_HEADERS ${SOFTARM_ROOM_HEADERS} <CLI/CLI.hpp> <yaml-cpp/yaml.h>)
+set(SOFTARM_TEST_HEADERS ${SOFTARM_ROOM_HEADERS} <gtest/gtest.h> <fstream> <random>)
+
+function(softarm_precompile kind)
+  if(NOT SOFTARM_PRECOMPILED_HEADERS)
+    return()
+  endif()
+  string(TOUPPER ${kind} KIND)
+  get_property(owner GLOBAL PROPERTY SOFTARM_${KIND}_HEADERS_OWNER)
+  foreach(target IN LISTS ARGN)
+    # The compiler takes a precompiled header only where the macros in it are what they were, in files without fmt too.
+    target_compile_definitions(${target} PRIVATE $<TARGET_PROPERTY:fmt::fmt,INTERFACE_COMPILE_DEFINITIONS>)
+    if(owner)
+      target_precompile_headers(${target} REUSE_FROM ${owner})
+    else()  # the first of its kind compiles for the others
+      set(owner ${target})
+      set_property(GLOBAL PROPERTY SOFTARM_${KIND}_HEADERS_OWNER ${target})
+      target_precompile_headers(${target} PRIVATE ${SOFTARM_${KIND}_HEADERS})
+    endif()
+  endforeach()
+endfunction()
