@@ -30,7 +30,7 @@ void bench(const Options& options) {
 
 void add_bench_loop_command(CLI::App& group) {
   auto options = std::make_shared<Options>();
-  options->config = SOFTARM_CONFIG_FOLDER "/paper_arm.yaml";
+  options->config = shared_file("config/paper_arm.yaml", SOFTARM_CONFIG_FOLDER "/paper_arm.yaml");
   CLI::App* command = group.add_subcommand(
       "loop", "Round trip and wake-ups of softarmd beside a bare LCM echo and a bare sleep");
   command->add_option("CONFIG", options->config, "experiment in YAML: its arm is meant")
