@@ -116,7 +116,8 @@ TEST(NotifierWithoutManager, DoesNothing) {
 }
 
 TEST(NotifierWithoutManager, TellsOfAnAddressThatIsNone) {
-  for (const std::string& address : {std::string("run/notify"), "/" + std::string(200, 'x')}) {
+  const std::string relative = "run/notify", too_long = std::string("/").append(200, 'x');
+  for (const std::string& address : {relative, too_long}) {
     setenv("NOTIFY_SOCKET", address.c_str(), 1);
     ServiceNotifier notifier;
     notifier.report(kStart_ns, {.state = "ACTIVE", .reason = ""});
