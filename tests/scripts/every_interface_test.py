@@ -12,19 +12,15 @@ import sys
 import tempfile
 import unittest
 
-from running_arm import ROOT, own_url, skip_without_multicast, start, write_config
+from running_arm import PYTHON, ROOT, own_url, skip_without_multicast, skip_without_our_python, start, write_config
 
-PYTHON = ROOT / "build/python/bin/python"
 PROGRAMS = pathlib.Path(sys.argv.pop(1))
 ROUNDS = int(os.environ.get("ROUNDS", "5"))
 DURATION_S = 10
 MOST = 1.2
 
-if not PYTHON.exists():
-    print("skipped: tools/python_environment was not run (it fetches the Python package lcm)")
-    sys.exit(77)
 skip_without_multicast()
-subprocess.run([ROOT / "tools/python_environment"], check=True, capture_output=True)  # the types as they are now
+skip_without_our_python()
 FIFO = ("chrt", "-f", "20") if subprocess.run(["chrt", "-f", "20", "true"], capture_output=True, check=False).returncode == 0 else ()
 
 
@@ -37,9 +33,7 @@ class EveryInterface(unittest.TestCase):
         cls.url = own_url()
 
     def config(self, base, more=""):
-        folder = self.folder / base
-        folder.mkdir()
-        return write_config(folder, f"{base}.yaml", self.url, more)
+        return write_config(self.folder, f"{base}.yaml", self.url, more)
 
     def track(self, *programs):
         """Error of u in rad and of the tip in m from 1 s on, of a run of the programs."""

@@ -4,26 +4,18 @@ Runs in the Python of tools/python_environment, which has the package lcm; skipp
 """
 import importlib.util
 import math
-import os
 import pathlib
-import subprocess
 import sys
 import tempfile
 import time
 import unittest
 
-from running_arm import ROOT, own_url, skip_without_multicast, start, write_config
+from running_arm import PYTHON, ROOT, go_on_in_our_python, own_url, skip_without_multicast, start, write_config
 
 EXAMPLE = ROOT / "docs/examples/follow.py"
-PYTHON = ROOT / "build/python/bin/python"
 
-if not PYTHON.exists():
-    print("skipped: tools/python_environment was not run (it fetches the Python package lcm)")
-    sys.exit(77)
 skip_without_multicast()
-if pathlib.Path(sys.prefix) != PYTHON.parents[1]:
-    subprocess.run([ROOT / "tools/python_environment"], check=True, capture_output=True)  # the types as they are now
-    os.execv(PYTHON, [PYTHON, "-B", *sys.argv])
+go_on_in_our_python()
 
 import lcm  # noqa: E402
 from softarm_messages import plant_state_t  # noqa: E402

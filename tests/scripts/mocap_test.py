@@ -5,23 +5,16 @@ Runs in the Python of tools/python_environment; skipped where that was not made.
 import os
 import pathlib
 import struct
-import subprocess
 import sys
 import tempfile
 import unittest
 
-from running_arm import ROOT, own_url, skip_without_multicast, start, tracks_within, write_config
+from running_arm import PYTHON, ROOT, go_on_in_our_python, own_url, skip_without_multicast, start, tracks_within, write_config
 
 EXAMPLE = ROOT / "docs/examples/republish.py"
-PYTHON = ROOT / "build/python/bin/python"
 
-if not PYTHON.exists():
-    print("skipped: tools/python_environment was not run (it fetches the Python package lcm)")
-    sys.exit(77)
 skip_without_multicast()
-if pathlib.Path(sys.prefix) != PYTHON.parents[1]:
-    subprocess.run([ROOT / "tools/python_environment"], check=True, capture_output=True)  # the types as they are now
-    os.execv(PYTHON, [PYTHON, "-B", *sys.argv])
+go_on_in_our_python()
 
 import lcm  # noqa: E402
 from softarm_messages import controller_status_t, optitrack_frame_t  # noqa: E402
@@ -39,9 +32,7 @@ class Mocap(unittest.TestCase):
         self.url = own_url()
 
     def config(self, base, more=""):
-        folder = self.folder / base
-        folder.mkdir()
-        return write_config(folder, f"{base}.yaml", self.url, more)
+        return write_config(self.folder, f"{base}.yaml", self.url, more)
 
     def closes(self, config, source):
         start(self, self.folder, PYTHON, "-B", EXAMPLE, "--url", self.url, "--source", source)

@@ -7,6 +7,7 @@ import subprocess
 import sys
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
+PYTHON = ROOT / "build/python/bin/python"
 
 
 def skip_without_multicast():
@@ -15,13 +16,28 @@ def skip_without_multicast():
         sys.exit(77)
 
 
+def skip_without_our_python():
+    """Skips where tools/python_environment was not run, which fetches the package lcm; brings its types up to date where it was."""
+    if not PYTHON.exists():
+        print("skipped: tools/python_environment was not run (it fetches the Python package lcm)")
+        sys.exit(77)
+    subprocess.run([ROOT / "tools/python_environment"], check=True, capture_output=True)
+
+
+def go_on_in_our_python():
+    """Begins the test anew in the Python that has the package lcm, or skips it."""
+    if pathlib.Path(sys.prefix) != PYTHON.parents[1]:
+        skip_without_our_python()
+        os.execv(PYTHON, [PYTHON, "-B", *sys.argv])
+
+
 def own_url():
     return f"udpm://239.255.76.67:{20000 + os.getpid() % 40000}?ttl=0"
 
 
 def write_config(folder, base, url, more=""):
     """An experiment like config/BASE on LCM at `url`; `more` is YAML of the top level."""
-    config = folder / "config.yaml"
+    config = folder / pathlib.Path(base).name
     config.write_text(f"include: {ROOT}/config/{base}\nname: under_test\n{more}daemon: {{lcm: {{url: \"{url}\"}}}}\n",
                       encoding="utf-8")
     return config
