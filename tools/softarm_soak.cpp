@@ -8,11 +8,13 @@
 #include "program.hpp"
 #include "signals.hpp"
 #include "soak/soak_run.hpp"
+#include "softarm/config/load.hpp"
 
 namespace softarm {
 namespace {
 
 int soak(SoakOptions options, const std::string& out, bool as_json) {
+  load_experiment(options.config);  // a wrong one is told by the name the user gave
   const bool own_folder = out.empty();
   options.folder =
       own_folder ? std::filesystem::temp_directory_path() / fmt::format("softarm_soak_{}", getpid())
@@ -43,8 +45,7 @@ int main(int argc, char** argv) {
   std::string out;
   bool as_json = false;
   app.add_option("CONFIG", options.config, "experiment in YAML: its arm and controller are meant")
-      ->required()
-      ->check(CLI::ExistingFile);
+      ->required();
   app.add_option("--duration", options.duration_s, "of the run")
       ->check(softarm::positive_seconds())
       ->capture_default_str();

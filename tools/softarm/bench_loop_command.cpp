@@ -7,6 +7,7 @@
 #include "program.hpp"
 #include "progress.hpp"
 #include "softarm/commands.hpp"
+#include "softarm/config/load.hpp"
 
 namespace softarm {
 namespace {
@@ -16,6 +17,7 @@ struct Options : LoopBenchOptions {
 };
 
 void bench(const Options& options) {
+  load_experiment(options.config);  // a wrong one is told by the name the user gave
   std::string text;
   {
     Progress progress(true);
