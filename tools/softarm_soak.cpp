@@ -52,7 +52,9 @@ int main(int argc, char** argv) {
   app.add_option("--between", options.between_s, "mean of the random time between two faults")
       ->check(softarm::positive_seconds())
       ->capture_default_str();
-  app.add_option("--seed", options.seed, "of faults and references")->capture_default_str();
+  app.add_option("--seed", options.seed, "of faults and references")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
   app.add_option("--out", out,
                  "folder for what the processes print; left out: a temporary one, kept after a "
                  "failure");

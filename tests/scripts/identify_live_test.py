@@ -13,6 +13,7 @@ from running_arm import own_url, skip_without_multicast, start, write_config
 
 PROGRAMS = pathlib.Path(sys.argv.pop(1))
 PATIENCE_S = 120
+SLEW_BAR_PER_S, PERIOD_S = 4, 0.01  # configured; of the commands
 BUSY = "no frame with every segment for"  # on a machine too busy for the simulated arm
 
 skip_without_multicast()
@@ -44,7 +45,8 @@ class IdentifyLive(unittest.TestCase):
     def play(self, limits, meanwhile=None, arm=True):
         """What `identify` prints, its exit code, and what it commanded. MEANWHILE gets it and the arm after the first step."""
         url = own_url()
-        config = write_config(self.folder, "one_segment.yaml", url, f"identification: {{steps_bar: [0.4], hold_s: 20, {limits}}}\n")
+        config = write_config(self.folder, "one_segment.yaml", url, f"actuation: {{slew_bar_per_s: {SLEW_BAR_PER_S}}}\n"
+                              f"identification: {{steps_bar: [0.4], hold_s: 20, {limits}}}\n")
         log, written = self.folder / "commands.log", self.folder / "identified.yaml"
         log.unlink(missing_ok=True)
         plant = start(self, self.folder, PROGRAMS / "softarm-plant", config) if arm else None
@@ -81,6 +83,8 @@ class IdentifyLive(unittest.TestCase):
         pushed = [k for k, (_, bar) in enumerate(sent) if any(bar)]
         self.assertTrue(pushed, told)
         self.assertAlmostEqual(max(max(bar) for _, bar in sent), 0.4, delta=1e-6)
+        rises = [max(b - a for a, b in zip(before, bar)) for (_, before), (_, bar) in zip(sent, sent[1:])]
+        self.assertLess(max(rises), SLEW_BAR_PER_S * PERIOD_S + 1e-6)
         after = [time_s for time_s, _ in sent[pushed[-1] + 1:]]
         self.assertGreater(after[-1] - after[0], 0.9)  # zero for a second, as the page says
 

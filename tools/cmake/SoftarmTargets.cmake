@@ -47,6 +47,14 @@ function(softarm_program name)
   install(TARGETS ${name} RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
 endfunction()
 
+# Only what is tested is optimised in full: a quarter of the tests' compile time.
+function(softarm_optimise_test target)
+  if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+    # At -O1 g++ 12 finds faults in Eigen and std::string that are none; in tests the sanitizers look for them.
+    target_compile_options(${target} PRIVATE $<$<NOT:$<CONFIG:Debug>>:-O1 -Wno-maybe-uninitialized -Wno-array-bounds -Wno-stringop-overflow>)
+  endif()
+endfunction()
+
 function(softarm_tests label room)
   cmake_parse_arguments(TESTS "ALONE" "SLOW" "DEPENDS" ${ARGN})
   file(GLOB sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/${room}/*_test.cpp)
@@ -59,6 +67,7 @@ function(softarm_tests label room)
   target_link_libraries(${target} PRIVATE ${TESTS_DEPENDS} GTest::gtest_main softarm_options)
   target_compile_definitions(${target} PRIVATE
     SOFTARM_SOURCE_DIR="${PROJECT_SOURCE_DIR}" SOFTARM_BINARY_DIR="${PROJECT_BINARY_DIR}")
+  softarm_optimise_test(${target})
   softarm_precompile(test ${target})
   set(usual "*")
   if(TESTS_SLOW)

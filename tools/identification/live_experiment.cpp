@@ -3,217 +3,155 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
-#include <deque>
 #include <stdexcept>
 
-#include "softarm/daemon/realtime.hpp"
-#include "softarm/estimation/curvature_estimator.hpp"
-#include "softarm/transport/lcm_node.hpp"
-#include "softarm/transport/message_decoding.hpp"
-#include "softarm/transport/mocap_source.hpp"
+#include "live/arm_listener.hpp"
+#include "live/commander.hpp"
 
 namespace softarm {
 namespace {
 
-constexpr std::int64_t kSecond_ns = 1'000'000'000;
-constexpr std::int64_t kCommandPeriod_ns = 10'000'000;
-constexpr std::int64_t kLost_ns = 200'000'000;  ///< without a frame: the arm is not seen
-constexpr std::int64_t kPatience_ns = 5 * kSecond_ns;
-constexpr std::int64_t kVent_ns = kSecond_ns;
-constexpr double kSpeedSpan_s = 0.05;  ///< so far apart, noise is no speed
+constexpr std::int64_t kListen_ns = 500'000'000;     ///< for others, before the first command
+constexpr std::int64_t kPatience_ns = 5'000'000'000;  ///< for frames, and for the arm to rest
+constexpr std::int64_t kLost_ns = 200'000'000;       ///< without a frame: the arm is not seen
+constexpr std::int64_t kStill_ns = 500'000'000;      ///< so long at rest before the first step
 constexpr double kStill_radps = 0.5;
+
+struct Sample {
+  std::int64_t time_ns;
+  Eigen::VectorXd value;
+};
+
+double seconds(std::int64_t time_ns) { return 1e-9 * static_cast<double>(time_ns); }
 
 class LiveExperiment {
  public:
   LiveExperiment(const Experiment& experiment, const std::function<bool()>& stop,
                  const std::function<void(const std::string&)>& progress)
       : experiment_(experiment),
-        lock_(experiment.daemon.lcm.command_channel + " on " + experiment.daemon.lcm.url),
-        mocap_(experiment.daemon, experiment.arm),
-        estimator_(experiment.estimation, experiment.arm,
-                   body_noise(experiment.estimation, experiment.arm.size(),
-                              experiment.daemon.bodies.base_id < 0)),
         node_(experiment.daemon.lcm.url),
+        commander_(experiment, node_),
+        listener_(experiment, node_, false),
         stop_(stop),
-        progress_(progress) {
-    for (std::size_t k = 0; k < mocap_.channels().size(); ++k)
-      node_.subscribe(mocap_.channels()[k], 1024,
-                      [this, k](const ReceivedMessage& packet) { take_frame(k, packet); });
-  }
+        progress_(progress) {}
 
   LiveOutcome run(const std::vector<std::vector<double>>& steps, double hold_s) {
-    wait_for_frames(steps.front().size());
-    const std::int64_t start_ns = monotonic_now_ns();
-    const auto hold_ns = static_cast<std::int64_t>(1e9 * hold_s);
+    listen();
+    std::string why;
     try {
-      for (std::size_t k = 0; k < steps.size() && aborted_.empty(); ++k) {
+      wait_for_rest();
+      const std::int64_t start_ns = monotonic_now_ns();
+      const auto hold_ns = static_cast<std::int64_t>(1e9 * hold_s);
+      for (std::size_t k = 0; k < steps.size() && why.empty(); ++k) {
         if (progress_) progress_(fmt::format("step {} of {}", k + 1, steps.size()));
-        recording_ = true;
-        command(steps[k], start_ns + static_cast<std::int64_t>(k) * hold_ns + hold_ns, true);
+        why = play(steps[k], start_ns + static_cast<std::int64_t>(k + 1) * hold_ns);
       }
     } catch (...) {
-      vent(steps.front().size());
+      commander_.vent_to_rest();
       throw;
     }
-    recording_ = false;
-    const std::string why = aborted_;
-    vent(steps.front().size());
+    commander_.vent_to_rest();
     return {record(), why};
   }
 
  private:
-  void wait_for_frames(std::size_t chambers) {
-    const std::int64_t end_ns = monotonic_now_ns() + kPatience_ns;
-    // Zero first: whoever holds the valves knows us, and the arm hangs.
-    while (monotonic_now_ns() < end_ns && !stop_requested() && (recent_.size() < 10 || !still()))
-      command(std::vector<double>(chambers, 0.0), monotonic_now_ns() + kCommandPeriod_ns, false);
-    if (stop_requested()) throw std::runtime_error("stopped before the first step");
-    if (recent_.size() < 10)
+  bool stop_requested() const { return stop_ && stop_(); }
+
+  void listen() {
+    const std::int64_t end_ns = monotonic_now_ns() + kListen_ns;
+    while (monotonic_now_ns() < end_ns && !stop_requested()) attend(end_ns);
+    if (const std::string other = listener_.other_commander(); !other.empty())
+      throw std::runtime_error(other);
+    listener_.commanding();
+  }
+
+  /// With zeros meanwhile: whoever holds the valves gets to know us, and the arm hangs.
+  void wait_for_rest() {
+    const std::int64_t start_ns = monotonic_now_ns();
+    std::int64_t moved_ns = start_ns;
+    const auto seen = [&] { return listener_.whole_frame_ns() > start_ns; };
+    for (std::int64_t now_ns = start_ns; now_ns < start_ns + kPatience_ns;
+         now_ns = monotonic_now_ns()) {
+      if (stop_requested()) throw std::runtime_error("stopped before the first step");
+      if (!seen() || listener_.fastest_radps() > kStill_radps) moved_ns = now_ns;
+      if (now_ns - moved_ns > kStill_ns) return;
+      commander_.vent(now_ns);
+      attend(commander_.next_ns());
+    }
+    if (!seen())
       throw std::runtime_error(fmt::format(
           "no frame with every segment on {} for {} s: is motion capture running, and do "
           "daemon.bodies name its bodies?",
-          mocap_.channels().front(), kPatience_ns / kSecond_ns));
-    if (!still())
-      throw std::runtime_error(
-          "the arm moves before the first step: expected it at rest; is "
-          "another controller commanding it?");
+          listener_.seen().channels.front(), kPatience_ns / 1'000'000'000));
+    throw std::runtime_error(
+        "the arm moves before the first step: expected it at rest; is another controller "
+        "commanding it?");
   }
 
-  bool stop_requested() const { return stop_ && stop_(); }
-  bool still() const { return speed_radps() < kStill_radps; }
-
-  /// Sends a command until `until_ns`, handling frames and watching the limits meanwhile.
-  void command(const std::vector<double>& bar, std::int64_t until_ns, bool watched) {
-    bool first = true;
+  /// One set point until `until_ns`; returns why the arm must be vented, or nothing.
+  std::string play(const std::vector<double>& bar, std::int64_t until_ns) {
+    const PressureVector wanted_bar =
+        Eigen::Map<const Eigen::VectorXd>(bar.data(), std::ssize(bar));
     for (std::int64_t now_ns = monotonic_now_ns(); now_ns < until_ns; now_ns = monotonic_now_ns()) {
-      if (now_ns >= next_command_ns_ || first) {
-        send(bar, now_ns);
-        if (first && recording_) note_input(bar, now_ns);
-        first = false;
-        next_command_ns_ = now_ns + kCommandPeriod_ns;
-      }
-      node_.wait_until(std::min(until_ns, next_command_ns_));
-      if (watched && !within_limits()) return;
+      const std::int64_t due_ns = commander_.next_ns();
+      commander_.update(wanted_bar, experiment_.actuation.slew_bar_per_s, now_ns);
+      if (commander_.next_ns() != due_ns) note_input(now_ns);
+      attend(std::min(until_ns, commander_.next_ns()));
+      note_frame();
+      if (stop_requested()) return "stopped";
+      if (std::string why = listener_.beyond_limits(kLost_ns); !why.empty()) return why;
     }
+    return {};
   }
 
-  void send(const std::vector<double>& bar, std::int64_t now_ns) {
-    ++message_.sequence;
-    message_.time_us = now_ns / 1000;
-    message_.validity_us =
-        static_cast<std::int32_t>(std::llround(1e6 * experiment_.daemon.lcm.command_validity_s));
-    message_.shadow = 0;
-    message_.pressure_bar.assign(bar.begin(), bar.end());
-    message_.num_chambers = static_cast<std::int16_t>(bar.size());
-    if (!node_.publish(experiment_.daemon.lcm.command_channel, message_))
-      throw TransportError("a command could not be sent: see tools/with_loopback_network --check");
+  /// Handles one message at most.
+  void attend(std::int64_t until_ns) {
+    node_.wait_until(until_ns);
+    listener_.look_at_clock();
   }
 
-  void vent(std::size_t chambers) {
-    command(std::vector<double>(chambers, 0.0), monotonic_now_ns() + kVent_ns, false);
+  void note_input(std::int64_t now_ns) {
+    if (inputs_.empty() || inputs_.back().value != commander_.sent_bar())
+      inputs_.push_back({now_ns, commander_.sent_bar()});
   }
 
-  bool within_limits() {
-    const IdentificationSettings& limits = experiment_.identification;
-    double theta_rad = 0.0;
-    for (Eigen::Index i = 0; i < experiment_.arm.size(); ++i)
-      theta_rad = std::max(theta_rad, recent_.back().u_rad.segment<2>(2 * i).norm());
-    if (stop_requested()) {
-      aborted_ = "stopped";
-    } else if (monotonic_now_ns() - last_frame_ns_ > kLost_ns) {
-      aborted_ = fmt::format("no frame with every segment for {} ms", kLost_ns / 1'000'000);
-    } else if (theta_rad > limits.max_theta_rad) {
-      aborted_ = fmt::format(
-          "a segment bends by {:.3g} rad, beyond identification.max_theta_rad "
-          "of {:.3g} rad",
-          theta_rad, limits.max_theta_rad);
-    } else if (speed_radps() > limits.max_speed_radps) {
-      aborted_ = fmt::format(
-          "a segment moves at {:.3g} rad/s, beyond "
-          "identification.max_speed_radps of {:.3g} rad/s",
-          speed_radps(), limits.max_speed_radps);
-    }
-    return aborted_.empty();
-  }
-
-  double speed_radps() const {
-    if (recent_.size() < 2) return 0.0;
-    const double span_s = recent_.back().time_s - recent_.front().time_s;
-    double fastest = 0.0;
-    for (Eigen::Index i = 0; i < experiment_.arm.size(); ++i)
-      fastest = std::max(fastest,
-                         (recent_.back().u_rad - recent_.front().u_rad).segment<2>(2 * i).norm());
-    return span_s > 0.0 ? fastest / span_s : 0.0;
-  }
-
-  struct Seen {
-    double time_s;
-    Eigen::VectorXd u_rad;
-  };
-
-  // Called from LCM: nothing may be thrown through it. Storage grows, which is all it can fail at.
-  void take_frame(std::size_t channel, const ReceivedMessage& packet) {
-    const std::int64_t now_ns = monotonic_now_ns();
-    if (mocap_.take(channel, packet.bytes, now_ns, frame_) != MocapReceipt::frame) return;
-    if (frame_.frame_number == last_number_) return;
-    last_number_ = frame_.frame_number;
-    estimator_.estimate(frame_, estimate_);
-    if (!std::all_of(estimate_.valid.begin(), estimate_.valid.begin() + experiment_.arm.size(),
-                     [](bool each) { return each; }))
-      return;
-    const double time_s = 1e-9 * static_cast<double>(frame_.capture_ns);
-    if (!recent_.empty() && time_s <= recent_.back().time_s) return;
-    last_frame_ns_ = now_ns;
-    recent_.push_back({time_s, estimate_.u_rad});
-    while (recent_.size() > 10 && recent_[1].time_s < time_s - kSpeedSpan_s) recent_.pop_front();
-    if (recording_) frames_.push_back(recent_.back());
-  }
-
-  void note_input(const std::vector<double>& bar, std::int64_t now_ns) {
-    inputs_.push_back(
-        {1e-9 * static_cast<double>(now_ns),
-         Eigen::Map<const Eigen::VectorXd>(bar.data(), static_cast<Eigen::Index>(bar.size()))});
+  void note_frame() {
+    const std::int64_t captured_ns = listener_.captured_ns();
+    if (frames_.empty() || captured_ns > frames_.back().time_ns)
+      frames_.push_back({captured_ns, listener_.u_rad()});
   }
 
   MotionRecord record() const {
     MotionRecord out;
     if (frames_.empty() || inputs_.empty()) return out;
-    const auto fill = [&](const std::vector<Seen>& from, Eigen::VectorXd& time_s,
+    const std::int64_t zero_ns = frames_.front().time_ns;
+    const auto fill = [&](const std::vector<Sample>& from, Eigen::VectorXd& time_s,
                           Eigen::MatrixXd& value) {
       const auto rows = static_cast<Eigen::Index>(from.size());
       time_s.resize(rows);
-      value.resize(rows, from.front().u_rad.size());
+      value.resize(rows, from.front().value.size());
       for (Eigen::Index k = 0; k < rows; ++k) {
-        time_s[k] = from[static_cast<std::size_t>(k)].time_s - frames_.front().time_s;
-        value.row(k) = from[static_cast<std::size_t>(k)].u_rad;
+        const Sample& sample = from[static_cast<std::size_t>(k)];
+        time_s[k] = seconds(sample.time_ns - zero_ns);
+        value.row(k) = sample.value;
       }
     };
     fill(frames_, out.time_s, out.u_rad);
     // The zero that was commanded before the first step, then the steps.
-    std::vector<Seen> inputs = {{std::min(frames_.front().time_s, inputs_.front().time_s) - 1.0,
-                                 Eigen::VectorXd::Zero(inputs_.front().u_rad.size())}};
+    std::vector<Sample> inputs = {{std::min(zero_ns, inputs_.front().time_ns) - 1'000'000'000,
+                                   Eigen::VectorXd::Zero(inputs_.front().value.size())}};
     inputs.insert(inputs.end(), inputs_.begin(), inputs_.end());
     fill(inputs, out.input.time_s, out.input.value);
     return out;
   }
 
   const Experiment& experiment_;
-  InstanceLock lock_;
-  MocapSource mocap_;
-  CurvatureEstimator estimator_;
   LcmNode node_;
+  Commander commander_;
+  ArmListener listener_;
   const std::function<bool()>& stop_;
   const std::function<void(const std::string&)>& progress_;
-  std::string aborted_;
-  bool recording_ = false;
-  std::deque<Seen> recent_;
-  std::vector<Seen> frames_, inputs_;
-  std::int64_t last_frame_ns_ = 0, next_command_ns_ = 0;
-  std::int64_t last_number_ = INT64_MIN;
-  MocapFrame frame_;
-  CurvatureEstimate estimate_;
-  softarm_messages::pressure_command_t message_;
+  std::vector<Sample> frames_, inputs_;
 };
 
 }  // namespace

@@ -107,6 +107,7 @@ void ArmListener::take_frame(std::int64_t now_ns) {
     return;
   u_rad_ = estimate_.u_rad;
   whole_frame_ns_ = now_ns;
+  captured_ns_ = frame_.capture_ns;
   recent_.push_back({now_ns, u_rad_});
   while (recent_.size() > 10 && recent_[1].arrival_ns < now_ns - kSpeedSpan_ns) recent_.pop_front();
 }
@@ -141,6 +142,29 @@ bool ArmListener::daemon_armed(std::int64_t now_ns) const {
   if (status_ns_ == kNever || now_ns - status_ns_ > kStatusCounts_ns) return false;
   const auto mode = static_cast<Mode>(status_.mode);
   return (status_.flags & kArmedFlag) != 0 || mode == Mode::active || mode == Mode::hold;
+}
+
+std::string ArmListener::other_commander() const {
+  if (!seen_.commanded_by_others && !daemon_armed(monotonic_now_ns())) return {};
+  return fmt::format("somebody commands pressures on {} (softarmd: {}); end it first",
+                     experiment_.daemon.lcm.command_channel, daemon_text());
+}
+
+std::string ArmListener::beyond_limits(std::int64_t lost_ns) const {
+  const IdentificationSettings& limits = experiment_.identification;
+  const std::int64_t now_ns = monotonic_now_ns();
+  if (daemon_armed(now_ns)) return "a daemon is armed: " + daemon_text();
+  if (whole_frame_ns_ == kNever || now_ns - whole_frame_ns_ > lost_ns)
+    return fmt::format("no frame with every segment for {} ms", lost_ns / 1'000'000);
+  if (largest_theta_rad() > limits.max_theta_rad)
+    return fmt::format(
+        "a segment bends by {:.3g} rad, beyond identification.max_theta_rad of {:.3g} rad",
+        largest_theta_rad(), limits.max_theta_rad);
+  if (fastest_radps() > limits.max_speed_radps)
+    return fmt::format(
+        "a segment moves at {:.3g} rad/s, beyond identification.max_speed_radps of {:.3g} rad/s",
+        fastest_radps(), limits.max_speed_radps);
+  return {};
 }
 
 std::string ArmListener::daemon_text() const {

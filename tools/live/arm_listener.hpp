@@ -32,18 +32,25 @@ class ArmListener {
   const Eigen::VectorXd& u_rad() const { return u_rad_; }
   /// Its arrival; kNever before the first.
   std::int64_t whole_frame_ns() const { return whole_frame_ns_; }
+  /// When it was captured, as far as `daemon.capture_time` lets us know; kNever before the first.
+  std::int64_t captured_ns() const { return captured_ns_; }
   /// Largest bend of a segment in that frame, and fastest over the last 50 ms, in rad and rad/s.
   double largest_theta_rad() const;
   double fastest_radps() const;
   /// Measured last; empty before the first.
   const std::vector<double>& measured_bar() const { return measured_bar_; }
 
-  /// Commands that move valves were seen, not counting those after `commanding`.
-  bool commanded_by_others() const { return seen_.commanded_by_others; }
+  /// Who else commands the arm, for a person; empty where nobody was heard to: no command that moves
+  /// valves was seen before `commanding`, and no daemon is armed.
+  std::string other_commander() const;
   /// From now on commands on the channel are our own.
   void commanding() { commanding_ = true; }
   /// A daemon that is armed or pressurises the arm said so within the last second.
   bool daemon_armed(std::int64_t now_ns) const;
+  /// Why a motion that a tool commands must end, for a person; empty where it may go on. A daemon is
+  /// armed, no frame showed every segment for `lost_ns`, a segment bends beyond
+  /// identification.max_theta_rad or moves faster than max_speed_radps.
+  std::string beyond_limits(std::int64_t lost_ns) const;
   /// "ACTIVE (none)", or "not heard".
   std::string daemon_text() const;
 
@@ -70,7 +77,7 @@ class ArmListener {
   std::set<int> known_ids_;
   Eigen::VectorXd u_rad_;
   std::deque<Bent> recent_;
-  std::int64_t whole_frame_ns_ = kNever;
+  std::int64_t whole_frame_ns_ = kNever, captured_ns_ = kNever;
   std::int64_t status_ns_ = kNever;
   std::vector<double> measured_bar_;
   MocapFrame frame_, other_frame_;

@@ -7,6 +7,7 @@ namespace softarm {
 namespace {
 
 constexpr std::int64_t kPeriod_ns = 10'000'000;
+constexpr std::int64_t kRest_ns = 1'000'000'000;
 
 }  // namespace
 
@@ -43,6 +44,15 @@ void Commander::update(const PressureVector& wanted_bar, double rate_bar_per_s,
 void Commander::vent(std::int64_t now_ns) {
   vent_ramps_.vent(bar_, step_s(now_ns), bar_);
   send(now_ns);
+}
+
+void Commander::vent_to_rest() {
+  std::int64_t now_ns = monotonic_now_ns();
+  for (std::int64_t end_ns = now_ns + kRest_ns; now_ns < end_ns; now_ns = monotonic_now_ns()) {
+    if (bar_.maxCoeff() > 0.0) end_ns = now_ns + kRest_ns;
+    vent(now_ns);
+    node_.wait_until(next_ns_);
+  }
 }
 
 // After a stall the ramp goes on where it was: no step makes up for it.

@@ -24,6 +24,8 @@ class Commander {
   void update(const PressureVector& wanted_bar, double rate_bar_per_s, std::int64_t now_ns);
   /// The same towards 0 bar, at actuation.vent_bar_per_s.
   void vent(std::int64_t now_ns);
+  /// Vents to the end and goes on commanding 0 bar for a second; messages are handled meanwhile.
+  void vent_to_rest();
 
   const PressureVector& sent_bar() const { return bar_; }
   std::int64_t next_ns() const { return next_ns_; }

@@ -35,12 +35,9 @@ int print(const std::vector<Finding>& findings, bool json) {
 int pulse(const Experiment& experiment, const LiveCheckOptions& options, LcmNode& node,
           ArmListener& listener, Commander& commander, Progress& progress) {
   const std::vector<Finding> at_rest = preflight(experiment, listener.seen());
-  if (listener.commanded_by_others() || listener.daemon_armed(monotonic_now_ns())) {
+  if (const std::string other = listener.other_commander(); !other.empty()) {
     print(at_rest, options.json);
-    print_error("softarm",
-                fmt::format("no chamber was filled: somebody commands pressures on {} "
-                            "(softarmd: {}); end it first",
-                            experiment.daemon.lcm.command_channel, listener.daemon_text()));
+    print_error("softarm", "no chamber was filled: " + other);
     return kExitOtherInstance;
   }
   if (const std::string obstacle = obstacle_to_pulses(at_rest); !obstacle.empty()) {

@@ -13,7 +13,6 @@ namespace {
 constexpr std::int64_t kLost_ns = 200'000'000;  ///< without a frame, or when the daemon would vent
 constexpr double kSoft_bar_per_s = 1.0;
 constexpr double kBefore_s = 0.2;  ///< at rest, to compare with
-constexpr double kVent_s = 0.5;
 
 std::int64_t to_ns(double time_s) { return static_cast<std::int64_t>(1e9 * time_s); }
 
@@ -21,8 +20,7 @@ class Player {
  public:
   Player(const Experiment& experiment, LcmNode& node, ArmListener& listener, Commander& commander,
          const std::function<bool()>& stop)
-      : experiment_(experiment),
-        node_(node),
+      : node_(node),
         listener_(listener),
         commander_(commander),
         stop_(stop),
@@ -50,15 +48,6 @@ class Player {
   }
   void rest(double time_s) { hold(least_bar_, 0.75 * time_s); }
 
-  void vent() {
-    const std::int64_t end_ns = monotonic_now_ns() + to_ns(kVent_s);
-    for (std::int64_t now_ns = monotonic_now_ns();
-         now_ns < end_ns || commander_.sent_bar().maxCoeff() > 0.0; now_ns = monotonic_now_ns()) {
-      commander_.vent(now_ns);
-      node_.wait_until(commander_.next_ns());
-    }
-  }
-
   const std::string& aborted() const { return aborted_; }
 
  private:
@@ -80,27 +69,8 @@ class Player {
     command(bar, [&](std::int64_t) { return commander_.sent_bar() == bar; });
   }
 
-  void watch() {
-    const IdentificationSettings& limits = experiment_.identification;
-    const std::int64_t now_ns = monotonic_now_ns();
-    if (stop_ && stop_()) {
-      aborted_ = "stopped";
-    } else if (listener_.daemon_armed(now_ns)) {
-      aborted_ = "a daemon is armed: " + listener_.daemon_text();
-    } else if (listener_.whole_frame_ns() < now_ns - lost_ns_) {
-      aborted_ = fmt::format("no frame with every segment for {} ms", lost_ns_ / 1'000'000);
-    } else if (listener_.largest_theta_rad() > limits.max_theta_rad) {
-      aborted_ = fmt::format(
-          "a segment bends by {:.3g} rad, beyond identification.max_theta_rad of {:.3g} rad",
-          listener_.largest_theta_rad(), limits.max_theta_rad);
-    } else if (listener_.fastest_radps() > limits.max_speed_radps) {
-      aborted_ = fmt::format(
-          "a segment moves at {:.3g} rad/s, beyond identification.max_speed_radps of {:.3g} rad/s",
-          listener_.fastest_radps(), limits.max_speed_radps);
-    }
-  }
+  void watch() { aborted_ = stop_ && stop_() ? "stopped" : listener_.beyond_limits(lost_ns_); }
 
-  const Experiment& experiment_;
   LcmNode& node_;
   ArmListener& listener_;
   Commander& commander_;
@@ -138,11 +108,11 @@ std::string play_pulses(const Experiment& experiment, const PulsePlan& plan, Lcm
       }
     }
   } catch (...) {
-    player.vent();
+    commander.vent_to_rest();
     throw;
   }
   const std::string aborted = player.aborted();
-  player.vent();
+  commander.vent_to_rest();
   return aborted;
 }
 

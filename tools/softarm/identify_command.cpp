@@ -238,8 +238,10 @@ void add_identify_command(CLI::App& app) {
                    "width in s of the window that smooths for the start")
       ->check(CLI::Range(0.005, 10.0))
       ->capture_default_str();
-  auto* seed = command->add_option("--seed", options->seed,
-                                   "seed of noise and dropouts (default: the configuration's)");
+  auto* seed = command
+                   ->add_option("--seed", options->seed,
+                                "seed of noise and dropouts (default: the configuration's)")
+                   ->check(CLI::NonNegativeNumber);
   auto* seeds = command
                     ->add_option("--seeds", options->study.seeds,
                                  "do it on so many arms drawn at random, and print how often the "

@@ -66,11 +66,8 @@ class Jog {
   int run() {
     const std::int64_t listened_ns = monotonic_now_ns() + kListen_ns;
     while (monotonic_now_ns() < listened_ns && stop_requested == 0) node_.wait_until(listened_ns);
-    if (listener_.commanded_by_others() || listener_.daemon_armed(monotonic_now_ns())) {
-      print_error("softarm",
-                  fmt::format("somebody commands pressures on {} (softarmd: {}); end it "
-                              "first",
-                              experiment_.daemon.lcm.command_channel, listener_.daemon_text()));
+    if (const std::string other = listener_.other_commander(); !other.empty()) {
+      print_error("softarm", other);
       return kExitOtherInstance;
     }
     listener_.commanding();
@@ -81,10 +78,10 @@ class Jog {
     try {
       follow_keys(terminal);
     } catch (...) {
-      vent();
+      commander_.vent_to_rest();
       throw;
     }
-    vent();
+    commander_.vent_to_rest();
     return kExitOk;
   }
 
@@ -118,15 +115,6 @@ class Jog {
           "rad",
           most_rad);
     if (listener_.daemon_armed(now_ns)) beyond_ = "vented: a daemon is armed";
-  }
-
-  void vent() {
-    const std::int64_t end_ns = monotonic_now_ns() + kListen_ns;
-    for (std::int64_t now_ns = monotonic_now_ns();
-         now_ns < end_ns || commander_.sent_bar().maxCoeff() > 0.0; now_ns = monotonic_now_ns()) {
-      commander_.vent(now_ns);
-      node_.wait_until(commander_.next_ns());
-    }
   }
 
   bool sees_arm(std::int64_t now_ns) const {

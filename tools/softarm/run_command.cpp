@@ -116,8 +116,10 @@ void add_run_command(CLI::App& app) {
   command->add_option("--mocap", options->mocap_log,
                       "take the frames from this LCM log instead of the simulated arm");
   command->add_flag("!--no-plots", options->plots, "do not draw the plots");
-  auto* seed = command->add_option("--seed", options->seed,
-                                   "seed of noise and dropouts (default: the configuration's)");
+  auto* seed = command
+                   ->add_option("--seed", options->seed,
+                                "seed of noise and dropouts (default: the configuration's)")
+                   ->check(CLI::NonNegativeNumber);
   command->callback([options, seed] {
     options->has_seed = seed->count() > 0;
     if (const int code = run(*options); code != kExitOk) throw CLI::RuntimeError(code);

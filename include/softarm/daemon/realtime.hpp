@@ -18,8 +18,9 @@ void sleep_until_ns(std::int64_t deadline_ns) noexcept;
 
 /// Applies scheduling, pinning and memory locking to the calling thread and process; with locked
 /// memory 256 KiB of the calling thread's stack are there already, so that they cause no page fault
-/// later. What the machine does not permit is left undone and reported: one line each, with the
-/// cure.
+/// later. The thread's sleeps end when they are due, to 1 ns instead of the usual 50 us, under any
+/// scheduling. What the machine does not permit is left undone and reported: one line each, with
+/// the cure.
 std::vector<std::string> apply_realtime_settings(const RealtimeSettings& settings);
 
 /// Whether the calling thread runs under SCHED_FIFO.

@@ -5,7 +5,6 @@
 #include <cstdio>
 #include <cstdlib>
 #include <iostream>
-#include <regex>
 #include <thread>
 
 #include "fault/hostile_packets.hpp"
@@ -35,20 +34,6 @@ class HostileBytes : public FaultTest {
         node_->publish("SOFTARM_OPERATOR", request);
       return under_pressure();
     })) << told();
-  }
-
-  /// The arm behind a terminal of its own, at a port of the kernel's choice.
-  std::unique_ptr<Process> start_terminal(int& port) {
-    auto plant = start("softarm-plant", {"--modbus", "0"});
-    std::smatch match;
-    std::string printed;
-    wait_for([&] {
-      printed = plant->printed();
-      return std::regex_search(printed, match, std::regex("127.0.0.1 port ([0-9]+)"));
-    });
-    port = match.empty() ? 0 : std::stoi(match[1]);
-    EXPECT_GT(port, 0) << printed;
-    return plant;
   }
 
   bool arm_is_vented() const {
@@ -126,8 +111,9 @@ TEST_P(HostileBytes, TheFragmentThatEndsEverySubscriberLeavesTheArmVentedAndTheR
       "  safety: {arming: explicit, valve_readback: true, valve_silence_s: 2, "
       "pressure_settling_s: 2, hold_after_s: 0.5, vent_after_s: 1, good_frames: 20}\n";
   write_config("paper_arm_modbus.yaml", safety);
-  int port = 0;
-  const auto plant = start_terminal(port);
+  const auto plant = start("softarm-plant", {"--modbus", "0"});
+  const int port = plant->port();
+  ASSERT_GT(port, 0) << plant->printed();
   write_config("paper_arm_modbus.yaml", safety,
                "valves: {port: " + std::to_string(port) +
                    ", rate_hz: 50, response_timeout_s: 0.019, tolerated_failures: 2, "

@@ -116,7 +116,8 @@ TEST_F(Run, WrongCommandLinesExitWith64) {
                                                     {"run", kPaperArm, "--no-such-option"},
                                                     {"run", kPaperArm, "--duration", "-1"},
                                                     {"run", kPaperArm, "--duration", "soon"},
-                                                    {"run", kPaperArm, "--seed", "x"}};
+                                                    {"run", kPaperArm, "--seed", "x"},
+                                                    {"run", kPaperArm, "--seed", "-1"}};
   for (const auto& arguments : wrong) EXPECT_EQ(start("softarm", arguments), 64) << printed;
   for (const char* program : {"softarmd", "softarm-plant"}) {
     EXPECT_EQ(start(program, {}), 64) << printed;

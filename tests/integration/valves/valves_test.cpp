@@ -75,18 +75,7 @@ class ValvesProgram : public ::testing::Test {
   }
 
   /// The simulated arm behind its server, at a port of the kernel's choice.
-  std::unique_ptr<Process> start_plant(int& port) {
-    auto plant = start("softarm-plant", {"--modbus", "0"});
-    std::smatch match;
-    std::string printed;
-    wait_for([&] {
-      printed = plant->printed();
-      return std::regex_search(printed, match, std::regex("127.0.0.1 port ([0-9]+)"));
-    });
-    port = match.empty() ? 0 : std::stoi(match[1]);
-    EXPECT_GT(port, 0) << printed;
-    return plant;
-  }
+  std::unique_ptr<Process> start_plant() { return start("softarm-plant", {"--modbus", "0"}); }
 
   /// Handles messages, and commands `bar` in every chamber (unless negative), until `reached`.
   bool wait_for(const std::function<bool()>& reached, double bar = -1.0, double patience_s = 20.0) {
@@ -137,9 +126,8 @@ class ValvesBehindARelay : public ValvesProgram {
  protected:
   void begin(const std::string& valves = "", const std::string& safety = "") {
     write_config(1, valves, safety);
-    int port = 0;
-    plant_process_ = start_plant(port);
-    relay_ = std::make_unique<Relay>(port);
+    plant_process_ = start_plant();
+    relay_ = std::make_unique<Relay>(plant_process_->port());
     write_config(relay_->port(), valves, safety);
     driver_ = start("softarm-valves");
   }
@@ -274,9 +262,8 @@ TEST_F(ValvesBehindARelay, ATerminalThatRestartsIsSecuredAgain) {
   ASSERT_EQ(plant_process_->wait(5s), 128 + SIGKILL);
   ASSERT_TRUE(wait_for([&] { return state() == ValveState::disconnected; }, 0.3))
       << driver_->printed();
-  int port = 0;
-  plant_process_ = start_plant(port);
-  relay_->server_port_ = port;
+  plant_process_ = start_plant();
+  relay_->server_port_ = plant_process_->port();
   expect_recovery();
   // Had its time-out not been set once more, this arm would keep its pressure.
   driver_->signal(SIGKILL);
@@ -364,13 +351,8 @@ class ValvesAtPymodbus : public ValvesProgram {
     pipe_ = (folder_ / "orders").string();
     ASSERT_EQ(mkfifo(pipe_.c_str(), 0600), 0);
     terminal_ = python("pymodbus_terminal.py", "12 40003 45395 46100" + more + " <>" + pipe_);
-    std::smatch match;
-    std::string printed;
-    ASSERT_TRUE(wait_for([&] {
-      printed = terminal_->printed();
-      return std::regex_search(printed, match, std::regex("port ([0-9]+)"));
-    })) << printed;
-    write_config(std::stoi(match[1]));
+    ASSERT_GT(terminal_->port(), 0) << terminal_->printed();
+    write_config(terminal_->port());
     driver_ = start("softarm-valves");
   }
   void order(const std::string& line) { std::ofstream(pipe_) << line << std::endl; }
@@ -437,9 +419,8 @@ TEST_F(ValvesAtPymodbus, ATerminalThatDoesNotTakeItsTimeOutIsNeverPressurised) {
 
 TEST_F(ValvesAtPymodbus, AForeignClientFindsTheSimulatedTerminalAsItShouldBe) {
   write_config(1);
-  int port = 0;
-  const auto plant = start_plant(port);
-  const auto client = python("pymodbus_client.py", std::to_string(port));
+  const auto plant = start_plant();
+  const auto client = python("pymodbus_client.py", std::to_string(plant->port()));
   int code = -1;
   wait_for([&] { return (code = client->wait(0ms)) >= 0; }, -1.0, 60.0);
   EXPECT_EQ(code, 0) << client->printed();
@@ -447,9 +428,8 @@ TEST_F(ValvesAtPymodbus, AForeignClientFindsTheSimulatedTerminalAsItShouldBe) {
 
 TEST_F(ValvesProgram, TheDaemonClosesTheLoopThroughEveryInterface) {
   write_config(1);
-  int port = 0;
-  const auto plant = start_plant(port);
-  write_config(port, ", rate_hz: 200, response_timeout_s: 0.0049");
+  const auto plant = start_plant();
+  write_config(plant->port(), ", rate_hz: 200, response_timeout_s: 0.0049");
   const auto driver = start("softarm-valves");
   const auto daemon = start("softarmd");
   // Two seconds into (24) every segment is bent by 0.4 rad.

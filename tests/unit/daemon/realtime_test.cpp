@@ -3,6 +3,7 @@
 #include "softarm/daemon/realtime.hpp"
 
 #include <gtest/gtest.h>
+#include <sys/prctl.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -67,6 +68,14 @@ TEST(Realtime, LockedMemoryIncludesTheStackThatATickNeeds) {
               return static_cast<int>(std::min(faults_of_deep_stack(), 100L));
             }),
             5);
+}
+
+TEST(Realtime, SleepsEndWhenDueWithoutFifoToo) {
+  const int slack_ns = in_a_child([] {
+    apply_realtime_settings({});
+    return prctl(PR_GET_TIMERSLACK);
+  });
+  EXPECT_EQ(slack_ns, 1);
 }
 
 TEST(Realtime, ACpuThatIsNotThereIsTold) {
