@@ -108,7 +108,7 @@ std::string timing_json(const TimingReport& report) {
     json.close_array();
     json.key("counts");
     json.open_array();
-    for (const std::int32_t count : each.counts) json.value(count);
+    for (const std::int64_t count : each.counts) json.value(count);
     json.close_array();
     json.close_object();
   }

@@ -82,6 +82,16 @@ std::string shared_file(const std::string& name, const std::string& source) {
 
 void say(const std::string& text) noexcept { std::fputs(text.c_str(), stderr); }
 
+CLI::Validator number_between(double low, double high) {
+  const auto check = [low, high](std::string& text) -> std::string {
+    double number = 0.0;
+    return CLI::detail::lexical_cast(text, number) && number >= low && number <= high
+               ? std::string()
+               : fmt::format("expected {:g} to {:g}, got {}", low, high, text);
+  };
+  return {check, fmt::format("{:g} to {:g}", low, high)};
+}
+
 CLI::Validator positive_seconds() {
   const auto check = [](std::string& text) -> std::string {
     double seconds = 0.0;

@@ -38,6 +38,9 @@ void say(const std::string& text) noexcept;
 /// Accepts a finite time above zero, in s.
 CLI::Validator positive_seconds();
 
+/// Accepts a number from `low` to `high`; "nan" is none.
+CLI::Validator number_between(double low, double high);
+
 /// Prints "NAME: error: MESSAGE" on stderr.
 void print_error(const std::string& program, const std::string& message);
 

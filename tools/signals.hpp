@@ -17,6 +17,11 @@ inline void catch_stop_signals() noexcept {
   sigaction(SIGHUP, &action, nullptr);
 }
 
+/// They end the process again.
+inline void release_stop_signals() noexcept {
+  for (const int number : {SIGTERM, SIGINT, SIGHUP}) std::signal(number, SIG_DFL);
+}
+
 /// A reader of our messages that goes away must not end us.
 inline void ignore_broken_pipes() noexcept { std::signal(SIGPIPE, SIG_IGN); }
 

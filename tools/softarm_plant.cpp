@@ -3,6 +3,7 @@
 // terminal's registers.
 #include <fmt/format.h>
 
+#include <cmath>
 #include <memory>
 #include <optional>
 #include <utility>
@@ -38,7 +39,10 @@ class PlantProcess {
       : lcm_(experiment.daemon.lcm),
         mocap_(experiment.daemon, experiment.plant.arm),
         node_(lcm_.url),
-        arm_(experiment.plant, monotonic_now_ns()),
+        // Registers hold until the terminal's own time-out, and for ever without one.
+        arm_(experiment.plant, monotonic_now_ns(),
+             modbus_port ? CommandExpiry::kNever
+                         : std::llround(1e9 * experiment.daemon.lcm.command_validity_s)),
         by_torque_(experiment.plant.actuation.kind == ActuationKind::torque),
         report_period_ns_(static_cast<std::int64_t>(1e9 / experiment.plant.mocap.rate_hz)) {
     if (modbus_port) {
@@ -194,11 +198,11 @@ int serve(const std::string& path, const std::string& sensor_suffix,
   if (by_torque && modbus_port)
     throw ConfigError(path, 0, "actuation.kind",
                       "chambers with --modbus: a terminal has valves, not moments", "torque");
-  const InstanceLock lock(lcm.mocap_channel + " on " + lcm.url);
+  const InstanceLock lock(lock_name(lcm.mocap_channel, lcm.url));
   // With softarm-valves there, measured pressures are its to publish.
   std::optional<InstanceLock> measurement_lock;
   if (!by_torque && !modbus_port)
-    measurement_lock.emplace(lcm.measurement_channel + " on " + lcm.url);
+    measurement_lock.emplace(lock_name(lcm.measurement_channel, lcm.url));
   catch_stop_signals();
   ignore_broken_pipes();
   say(fmt::format(

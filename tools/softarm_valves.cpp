@@ -32,6 +32,7 @@ ValveGuardSettings guard_settings(const Experiment& experiment) {
           .chambers = chambers_of(experiment),
           .max_pressure_bar = experiment.actuation.max_pressure_bar,
           .rise_bar_per_s = experiment.actuation.vent_bar_per_s,
+          .longest_validity_s = experiment.daemon.lcm.command_validity_s,
           .wait_for_zero = experiment.daemon.safety.arming == Arming::explicit_};
 }
 
@@ -301,8 +302,8 @@ int serve(const std::string& path) {
                       "torque");
   const LcmSettings& lcm = experiment.daemon.lcm;
   const ValveDriverSettings& valves = experiment.valves;
-  const InstanceLock commands_lock("valves of " + lcm.command_channel + " on " + lcm.url);
-  const InstanceLock measurement_lock(lcm.measurement_channel + " on " + lcm.url);
+  const InstanceLock commands_lock(lock_name("valves of " + lcm.command_channel, lcm.url));
+  const InstanceLock measurement_lock(lock_name(lcm.measurement_channel, lcm.url));
   const InstanceLock terminal_lock(
       fmt::format("terminal {}:{} unit {}", valves.host, valves.port, valves.unit_id));
   catch_stop_signals();

@@ -205,7 +205,7 @@ int serve(const std::string& path, bool shadow) {
   const Experiment experiment = load_experiment(path);
   const LcmSettings& lcm = experiment.daemon.lcm;
   const std::string channel = lcm.command_channel + (shadow ? " (shadow)" : "");
-  const InstanceLock lock(channel + " on " + lcm.url);
+  const InstanceLock lock(lock_name(channel, lcm.url));
   catch_stop_signals();
   ignore_broken_pipes();
 

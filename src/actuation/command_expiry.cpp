@@ -18,8 +18,8 @@ int checked_count(int chambers) {
 
 }  // namespace
 
-CommandExpiry::CommandExpiry(int chambers)
-    : set_points_bar_(Eigen::VectorXd::Zero(checked_count(chambers))) {}
+CommandExpiry::CommandExpiry(int chambers, std::int64_t longest_ns)
+    : longest_ns_(longest_ns), set_points_bar_(Eigen::VectorXd::Zero(checked_count(chambers))) {}
 
 CommandVerdict CommandExpiry::receive(const PressureCommand& command,
                                       std::int64_t arrival_ns) noexcept {
@@ -38,8 +38,8 @@ CommandVerdict CommandExpiry::receive(const PressureCommand& command,
   }
   sequence_ = command.sequence;
   // Saturating: a validity of "for ever" must not wrap around into the past.
-  expires_ns_ =
-      command.validity_ns < kNever - 1 - arrival_ns ? arrival_ns + command.validity_ns : kNever - 1;
+  const std::int64_t validity_ns = std::min(command.validity_ns, longest_ns_);
+  expires_ns_ = validity_ns < kNever - 1 - arrival_ns ? arrival_ns + validity_ns : kNever - 1;
   std::copy(command.pressure_bar.begin(), command.pressure_bar.end(), set_points_bar_.data());
   return CommandVerdict::in_force;
 }

@@ -20,6 +20,7 @@ ControlPipeline::ControlPipeline(const PipelineSettings& settings)
     : settings_(settings),
       period_ns_(to_ns(1.0 / settings.daemon.rate_hz)),
       period_s_(1.0 / settings.daemon.rate_hz),
+      validity_ns_(to_ns(settings.daemon.lcm.command_validity_s)),
       validator_(
           settings.estimation, settings.arm,
           body_noise(settings.estimation, settings.arm.size(), settings.daemon.bodies.base_id < 0)),
@@ -40,6 +41,7 @@ ControlPipeline::ControlPipeline(const PipelineSettings& settings)
 
 const TickOutput& ControlPipeline::tick(const TickInput& input) noexcept {
   if (!ticked_) epoch_ns_ = input.now_ns;
+  forget_expired_command(input.now_ns);
   SafetyInput safety;
   validate_and_estimate(input, safety);
 
@@ -74,6 +76,15 @@ const TickOutput& ControlPipeline::tick(const TickInput& input) noexcept {
   previous_ns_ = input.now_ns;
   ticked_ = true;
   return output_;
+}
+
+/// Held up for longer than a command is valid, we find an arm that the valves have vented: its
+/// pressures rise from zero again, within the slew.
+void ControlPipeline::forget_expired_command(std::int64_t now_ns) noexcept {
+  if (!ticked_ || now_ns - previous_ns_ < validity_ns_) return;
+  previous_bar_.setZero();
+  output_.pressure_bar.setZero();
+  pressure_watch_.reset();
 }
 
 void ControlPipeline::validate_and_estimate(const TickInput& input, SafetyInput& safety) noexcept {
@@ -113,7 +124,13 @@ void ControlPipeline::validate_and_estimate(const TickInput& input, SafetyInput&
   safety.newest_capture_ns =
       *std::min_element(seen_ns_.begin(), seen_ns_.begin() + settings_.arm.size());
   safety.poses_frozen = poses_frozen();
-  safety.soft_limit_exceeded = safety_.mode() == Mode::active && beyond_soft_limit();
+  // In HOLD only while the arm is seen, as what is predicted longer than that is no evidence, and
+  // by its bend alone: where it is seen again after a while, the filter takes the way for speed.
+  const bool held_and_seen =
+      safety_.mode() == Mode::hold && safety.newest_capture_ns != kNever &&
+      input.now_ns - safety.newest_capture_ns <= safety_.thresholds().hold_after_ns;
+  safety.soft_limit_exceeded = (safety_.mode() == Mode::active && beyond_soft_limit(true)) ||
+                               (held_and_seen && beyond_soft_limit(false));
   safety.fully_vented = fully_vented();
   safety.consecutive_overruns = input.consecutive_overruns;
   safety.newest_measurement_ns = input.newest_measurement_ns;
@@ -224,13 +241,13 @@ bool ControlPipeline::poses_frozen() const noexcept {
              kFrozenCommandChange_bar;
 }
 
-bool ControlPipeline::beyond_soft_limit() const noexcept {
+bool ControlPipeline::beyond_soft_limit(bool speed_too) const noexcept {
   const FilteredMotion& motion = output_.motion;
   for (int i = 0; i < motion.segments; ++i) {
     if (motion.u_rad.segment<2>(2 * i).norm() >
             kSoftLimitMargin * settings_.control.max_theta_rad ||
-        motion.velocity_radps.segment<2>(2 * i).norm() >
-            kSoftLimitMargin * settings_.control.max_speed_radps)
+        (speed_too && motion.velocity_radps.segment<2>(2 * i).norm() >
+                          kSoftLimitMargin * settings_.control.max_speed_radps))
       return true;
   }
   return false;

@@ -79,6 +79,10 @@ bool runs_under_fifo() noexcept {
   return pthread_getschedparam(pthread_self(), &policy, &parameter) == 0 && policy == SCHED_FIFO;
 }
 
+std::string lock_name(const std::string& channel, const std::string& url) {
+  return channel + " on " + url.substr(0, url.find('?'));
+}
+
 InstanceLock::InstanceLock(const std::string& name) {
   sockaddr_un address{};
   address.sun_family = AF_UNIX;

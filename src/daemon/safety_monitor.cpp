@@ -7,6 +7,9 @@
 namespace softarm {
 namespace {
 
+/// So long after a stop of the daemon what arrives may have been sent before it.
+constexpr std::int64_t kStaleRequests_ns = 500'000'000;
+
 /// Everything a cause may look at.
 struct Evidence {
   const SafetyInput& input;
@@ -163,9 +166,11 @@ SafetyMonitor::SafetyMonitor(const SafetySettings& settings, double control_peri
 /// silent their newest measurement looks old although they never were. Where nothing was heard
 /// since the stop before, another one changes nothing.
 void SafetyMonitor::note_stop(const SafetyInput& input) noexcept {
-  const bool stopped =
-      mode_ != Mode::init && input.now_ns - previous_tick_ns_ > thresholds_.valve_silence_ns;
-  if (stopped && input.newest_measurement_ns > listening_since_ns_)
+  if (mode_ == Mode::init) return;
+  const std::int64_t stopped_ns = input.now_ns - previous_tick_ns_;
+  if (stopped_ns > thresholds_.vent_after_ns) deaf_until_ns_ = input.now_ns + kStaleRequests_ns;
+  if (stopped_ns > thresholds_.valve_silence_ns &&
+      input.newest_measurement_ns > listening_since_ns_)
     listening_since_ns_ = input.now_ns;
 }
 
@@ -189,17 +194,17 @@ CauseRule SafetyMonitor::worst_cause(const SafetyInput& input) const noexcept {
 }
 
 void SafetyMonitor::take_operator_requests(const SafetyInput& input, Mode demanded) noexcept {
-  // Armed is granted for what the operator sees now, never stored up for when a cause has gone.
-  if (input.arm && demanded < Mode::vent && mode_ != Mode::fault) armed_ = true;
+  // Armed is granted for what the operator sees now, never stored up for when a cause has gone, nor
+  // for what queued up in the kernel while we were stopped and comes in as if it were new.
+  if (input.arm && demanded < Mode::vent && mode_ != Mode::fault && input.now_ns >= deaf_until_ns_)
+    armed_ = true;
   if (input.disarm || input.shutdown) armed_ = false;
 }
 
 void SafetyMonitor::enter(const CauseRule& cause) noexcept {
   // With automatic arming a vent gives the arming back by itself, but not to an arm that ran beyond
   // its limits (it would do so again and again), nor against a person's will.
-  if (cause.demands >= Mode::vent &&
-      (cause.clearance != Clearance::good_frames || settings_.arming == Arming::explicit_))
-    armed_ = false;
+  if (cause.demands >= Mode::vent && cause.clearance != Clearance::good_frames) armed_ = false;
   mode_ = cause.demands;
   reason_ = cause.reason;
 }
@@ -221,6 +226,8 @@ Mode SafetyMonitor::step(const SafetyInput& input) noexcept {
   note_stop(input);
   const CauseRule worst = worst_cause(input);
   take_operator_requests(input, worst.demands);
+  // In WAIT_FRAMES too, which such a cause does not leave.
+  if (worst.demands >= Mode::vent && settings_.arming == Arming::explicit_) armed_ = false;
   previous_tick_ns_ = input.now_ns;
   if (mode_ == Mode::init) {
     mode_ = Mode::wait_frames;

@@ -12,11 +12,12 @@ std::span<const double> as_span(const Eigen::VectorXd& values) {
 
 }  // namespace
 
-SimulatedArm::SimulatedArm(const PlantSettings& settings, std::int64_t start_ns)
+SimulatedArm::SimulatedArm(const PlantSettings& settings, std::int64_t start_ns,
+                           std::int64_t longest_validity_ns)
     : start_ns_(start_ns),
       now_ns_(start_ns),
       plant_(settings),
-      expiry_(plant_.chambers()),
+      expiry_(plant_.chambers(), longest_validity_ns),
       mocap_(settings.mocap, plant_.segments(), settings.seed, start_ns),
       segment_ends_(static_cast<std::size_t>(plant_.segments())) {
   advance_to(start_ns);

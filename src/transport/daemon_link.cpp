@@ -196,7 +196,8 @@ void DaemonLink::publish_timing(std::int64_t now_ns, const LoopTiming& timing) n
   std::int32_t* counts[] = {message.lateness_count, message.frame_age_count, message.tick_count,
                             message.publish_count};
   for (std::size_t k = 0; k < 4; ++k) {
-    std::copy(histograms[k]->counts().begin(), histograms[k]->counts().end(), counts[k]);
+    std::transform(histograms[k]->counts().begin(), histograms[k]->counts().end(), counts[k],
+                   counter);
     message.max_us[k] = static_cast<float>(histograms[k]->max_us());
   }
   if (!node_.publish(settings_.lcm.timing_channel, message)) ++unsent_;

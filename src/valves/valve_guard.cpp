@@ -49,7 +49,7 @@ ValveGuard::ValveGuard(const ValveGuardSettings& settings)
       stuck_after_ns_(to_ns(settings.driver.stuck_after_s)),
       good_cycles_needed_(std::max(
           kStartCycles, static_cast<int>(std::ceil(kGoodFor_s * settings.driver.rate_hz)))),
-      expiry_(settings.chambers),
+      expiry_(settings.chambers, to_ns(settings.longest_validity_s)),
       backoff_ns_(first_backoff_ns_),
       must_see_zero_(settings.wait_for_zero),
       set_points_bar_(Eigen::VectorXd::Zero(settings.chambers)),

@@ -11,10 +11,10 @@
 namespace softarm {
 namespace {
 
-constexpr std::int64_t kListen_ns = 500'000'000;     ///< for others, before the first command
+constexpr std::int64_t kListen_ns = 500'000'000;      ///< for others, before the first command
 constexpr std::int64_t kPatience_ns = 5'000'000'000;  ///< for frames, and for the arm to rest
-constexpr std::int64_t kLost_ns = 200'000'000;       ///< without a frame: the arm is not seen
-constexpr std::int64_t kStill_ns = 500'000'000;      ///< so long at rest before the first step
+constexpr std::int64_t kLost_ns = 200'000'000;        ///< without a frame: the arm is not seen
+constexpr std::int64_t kStill_ns = 500'000'000;       ///< so long at rest before the first step
 constexpr double kStill_radps = 0.5;
 
 struct Sample {
@@ -69,7 +69,9 @@ class LiveExperiment {
   void wait_for_rest() {
     const std::int64_t start_ns = monotonic_now_ns();
     std::int64_t moved_ns = start_ns;
-    const auto seen = [&] { return listener_.whole_frame_ns() > start_ns; };
+    const auto seen = [&] {
+      return listener_.whole_frame_ns() > std::max(start_ns, monotonic_now_ns() - kLost_ns);
+    };
     for (std::int64_t now_ns = start_ns; now_ns < start_ns + kPatience_ns;
          now_ns = monotonic_now_ns()) {
       if (stop_requested()) throw std::runtime_error("stopped before the first step");
@@ -93,13 +95,13 @@ class LiveExperiment {
     const PressureVector wanted_bar =
         Eigen::Map<const Eigen::VectorXd>(bar.data(), std::ssize(bar));
     for (std::int64_t now_ns = monotonic_now_ns(); now_ns < until_ns; now_ns = monotonic_now_ns()) {
+      if (stop_requested()) return "stopped";
+      if (std::string why = listener_.beyond_limits(kLost_ns); !why.empty()) return why;
       const std::int64_t due_ns = commander_.next_ns();
       commander_.update(wanted_bar, experiment_.actuation.slew_bar_per_s, now_ns);
       if (commander_.next_ns() != due_ns) note_input(now_ns);
       attend(std::min(until_ns, commander_.next_ns()));
       note_frame();
-      if (stop_requested()) return "stopped";
-      if (std::string why = listener_.beyond_limits(kLost_ns); !why.empty()) return why;
     }
     return {};
   }

@@ -20,12 +20,11 @@ struct LiveOutcome {
 /// experiment over, where
 ///  - `stop` says so (Ctrl-C), or a daemon says that it is armed,
 ///  - a segment bends beyond identification.max_theta_rad or moves faster than max_speed_radps
-///    (between frames 50 ms apart or more),
+///    (over the last 50 ms),
 ///  - no frame shows every segment for 0.2 s.
-/// It never lasts longer than the steps it plays.
 /// After venting zero is sent for a second; whoever holds the valves vents by itself should we die
-/// before (command_validity_s). No other controller may command the arm meanwhile: the daemon's lock
-/// on the command channel is taken, and others are listened for.
+/// before (command_validity_s). No other controller may command the arm meanwhile: the daemon's
+/// lock on the command channel is taken, and others are listened for.
 /// @throws TransportError; OtherInstance; std::runtime_error where somebody else commands the arm,
 /// frames do not come within 5 s, the arm moves already, or moments would be asked of a real valve
 LiveOutcome play_steps(const Experiment& experiment, const StepPlan& plan,

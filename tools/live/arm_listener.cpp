@@ -15,7 +15,7 @@ namespace {
 constexpr int kQueue = 1024;
 constexpr std::int64_t kSpeedSpan_ns = 50'000'000;  ///< so far apart, noise is no speed
 constexpr std::int64_t kStatusCounts_ns = 1'000'000'000;
-constexpr std::int16_t kArmedFlag = 1 << 5;
+constexpr std::int16_t kShadowFlag = 1 << 4, kArmedFlag = 1 << 5;
 
 std::int64_t wall_now_ns() {
   return std::chrono::duration_cast<std::chrono::nanoseconds>(
@@ -57,7 +57,9 @@ ArmListener::ArmListener(const Experiment& experiment, LcmNode& node, bool keep)
       seen_.commanded_by_others = true;
   });
   node.subscribe(lcm.status_channel, kQueue, [this](const ReceivedMessage& packet) {
-    if (decode(packet.bytes, status_)) status_ns_ = monotonic_now_ns();
+    // A shadow commands nothing.
+    if (decode(packet.bytes, status_) && (status_.flags & kShadowFlag) == 0)
+      status_ns_ = monotonic_now_ns();
   });
 }
 
@@ -101,6 +103,9 @@ void ArmListener::take_frame(std::int64_t now_ns) {
                             frame_.frame_number,
                             {frame_.body.begin(), frame_.body.begin() + n + 1},
                             {other_frame_.body.begin(), other_frame_.body.begin() + n + 1}});
+  // Who repeats his last frame does not see the arm.
+  if (frame_.frame_number == last_number_ || frame_.capture_ns <= captured_ns_) return;
+  last_number_ = frame_.frame_number;
   estimator_.estimate(frame_, estimate_);
   if (!std::all_of(estimate_.valid.begin(), estimate_.valid.begin() + n,
                    [](bool each) { return each; }))

@@ -40,15 +40,15 @@ class ArmListener {
   /// Measured last; empty before the first.
   const std::vector<double>& measured_bar() const { return measured_bar_; }
 
-  /// Who else commands the arm, for a person; empty where nobody was heard to: no command that moves
-  /// valves was seen before `commanding`, and no daemon is armed.
+  /// Who else commands the arm, for a person; empty where nobody was heard to: no command that
+  /// moves valves was seen before `commanding`, and no daemon is armed.
   std::string other_commander() const;
   /// From now on commands on the channel are our own.
   void commanding() { commanding_ = true; }
   /// A daemon that is armed or pressurises the arm said so within the last second.
   bool daemon_armed(std::int64_t now_ns) const;
-  /// Why a motion that a tool commands must end, for a person; empty where it may go on. A daemon is
-  /// armed, no frame showed every segment for `lost_ns`, a segment bends beyond
+  /// Why a motion that a tool commands must end, for a person; empty where it may go on. A daemon
+  /// is armed, no frame showed every segment for `lost_ns`, a segment bends beyond
   /// identification.max_theta_rad or moves faster than max_speed_radps.
   std::string beyond_limits(std::int64_t lost_ns) const;
   /// "ACTIVE (none)", or "not heard".
@@ -78,6 +78,7 @@ class ArmListener {
   Eigen::VectorXd u_rad_;
   std::deque<Bent> recent_;
   std::int64_t whole_frame_ns_ = kNever, captured_ns_ = kNever;
+  std::int64_t last_number_ = kNever;
   std::int64_t status_ns_ = kNever;
   std::vector<double> measured_bar_;
   MocapFrame frame_, other_frame_;

@@ -18,7 +18,7 @@ int chamber_count(const ActuationSettings& actuation) {
 }
 
 Commander::Commander(const Experiment& experiment, LcmNode& node)
-    : lock_(experiment.daemon.lcm.command_channel + " on " + experiment.daemon.lcm.url),
+    : lock_(lock_name(experiment.daemon.lcm.command_channel, experiment.daemon.lcm.url)),
       node_(node),
       experiment_(experiment),
       vent_ramps_(experiment.actuation),
@@ -55,8 +55,10 @@ void Commander::vent_to_rest() {
   }
 }
 
-// After a stall the ramp goes on where it was: no step makes up for it.
+// No step makes up for a stall. One that a command does not outlive has vented the valves: the
+// ramp begins anew at zero.
 double Commander::step_s(std::int64_t now_ns) {
+  if (now_ns - sent_ns_ >= 1000 * std::int64_t{message_.validity_us}) bar_.setZero();
   const std::int64_t passed_ns = std::clamp<std::int64_t>(now_ns - updated_ns_, 0, period_ns_);
   updated_ns_ = now_ns;
   return 1e-9 * static_cast<double>(passed_ns);
@@ -65,6 +67,7 @@ double Commander::step_s(std::int64_t now_ns) {
 void Commander::send(std::int64_t now_ns) {
   if (now_ns < next_ns_) return;
   next_ns_ = now_ns + period_ns_;
+  sent_ns_ = now_ns;
   ++message_.sequence;
   message_.time_us = now_ns / 1000;
   message_.pressure_bar.assign(bar_.begin(), bar_.end());

@@ -20,7 +20,8 @@ class Commander {
   Commander(const Experiment& experiment, LcmNode& node);
 
   /// Moves every pressure towards `wanted_bar` by at most the slew for the time since the last
-  /// call, at most `rate_bar_per_s`, and sends them when they are due. @throws TransportError
+  /// call, at most `rate_bar_per_s`, and sends them when they are due; from zero where the command
+  /// before is no longer valid. @throws TransportError
   void update(const PressureVector& wanted_bar, double rate_bar_per_s, std::int64_t now_ns);
   /// The same towards 0 bar, at actuation.vent_bar_per_s.
   void vent(std::int64_t now_ns);
@@ -40,7 +41,7 @@ class Commander {
   const Experiment& experiment_;
   PressureRamps vent_ramps_;
   PressureVector bar_;
-  std::int64_t period_ns_, next_ns_ = 0, updated_ns_ = 0;
+  std::int64_t period_ns_, next_ns_ = 0, updated_ns_ = 0, sent_ns_ = 0;
   softarm_messages::pressure_command_t message_;
 };
 

@@ -53,12 +53,13 @@ class Player {
  private:
   template <class Done>
   void command(const PressureVector& bar, const Done& done) {
-    for (std::int64_t now_ns = monotonic_now_ns(); aborted_.empty() && !done(now_ns);
-         now_ns = monotonic_now_ns()) {
+    for (std::int64_t now_ns = monotonic_now_ns(); !done(now_ns); now_ns = monotonic_now_ns()) {
+      if (aborted_.empty())
+        aborted_ = stop_ && stop_() ? "stopped" : listener_.beyond_limits(lost_ns_);
+      if (!aborted_.empty()) return;
       commander_.update(bar, kSoft_bar_per_s, now_ns);
       node_.wait_until(commander_.next_ns());
       listener_.look_at_clock();
-      watch();
     }
   }
   void hold(const PressureVector& bar, double time_s) {
@@ -68,8 +69,6 @@ class Player {
   void reach(const PressureVector& bar) {
     command(bar, [&](std::int64_t) { return commander_.sent_bar() == bar; });
   }
-
-  void watch() { aborted_ = stop_ && stop_() ? "stopped" : listener_.beyond_limits(lost_ns_); }
 
   LcmNode& node_;
   ArmListener& listener_;

@@ -99,11 +99,14 @@ void SoakArm::take_status(const ReceivedMessage& packet) {
 }
 
 void SoakArm::take_command(const ReceivedMessage& packet) {
-  const std::vector<float> before = command_.pressure_bar;
-  const std::int64_t sequence = command_.sequence;
+  std::vector<float> before = command_.pressure_bar;
+  const std::int64_t sequence = command_.sequence, sent_us = command_.time_us;
   if (!decode(packet.bytes, command_)) return;  // bytes of our own that are no command
   ++commands_;
-  const bool follows = command_.sequence == sequence + 1;
+  // One that comes after the validity of the one before, or from a new daemon, finds vented valves.
+  const bool lapsed = command_.time_us - sent_us >= command_.validity_us;
+  if (lapsed) std::fill(before.begin(), before.end(), 0.0F);
+  const bool follows = command_.sequence == sequence + 1 || (lapsed && command_.sequence == 1);
   bool inside = true;
   for (std::size_t j = 0; j < command_.pressure_bar.size(); ++j) {
     const auto now = static_cast<double>(command_.pressure_bar[j]);

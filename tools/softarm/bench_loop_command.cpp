@@ -42,7 +42,7 @@ void add_bench_loop_command(CLI::App& group) {
       ->check(positive_seconds())
       ->capture_default_str();
   command->add_option("--rate", options->rate_hz, "of softarmd and of the bare sleep, in Hz")
-      ->check(CLI::Range(10.0, 5000.0))
+      ->check(number_between(10.0, 5000.0))
       ->capture_default_str();
   command->add_option("--busy", options->busy_processes, "busy processes of the loaded scene")
       ->check(CLI::Range(0, 1000))

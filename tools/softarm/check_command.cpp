@@ -55,11 +55,11 @@ void add_live_options(CLI::App& command, CheckOptions& options) {
   command
       .add_option("--pressure", more.plan.pressure_bar,
                   "of a pulse, in bar (default: what bends a segment alone by 0.15 rad)")
-      ->check(CLI::Range(0.001, 100.0))
+      ->check(number_between(0.001, 100.0))
       ->needs(pulse);
   command
       .add_option("--hold", more.plan.hold_s, "of a pulse, in s: two thirds settle, one measures")
-      ->check(CLI::Range(0.05, 100.0))
+      ->check(number_between(0.05, 100.0))
       ->capture_default_str()
       ->needs(pulse);
 }

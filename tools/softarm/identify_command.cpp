@@ -47,6 +47,7 @@ MotionRecord play(const Experiment& experiment, const Command& command) {
   const LiveOutcome outcome = play_steps(
       experiment, command.plan, [] { return stop_requested != 0; },
       [&](const std::string& text) { progress.update(text); });
+  release_stop_signals();  // nothing moves any more
   if (!outcome.aborted.empty())
     throw std::runtime_error("vented, nothing identified: " + outcome.aborted);
   return outcome.record;
@@ -168,12 +169,12 @@ void add_source_options(CLI::App& command, Command& options) {
   command.add_option("--to", options.to_s, "end in the log (default: its end)");
   command.add_option("--skip", options.skip_s, "simulate so many s before comparing");
   command.add_option("--apart", options.apart_s, "take frames of the log at least so many s apart")
-      ->check(CLI::Range(0.0, 10.0));
+      ->check(number_between(0.0, 10.0));
   command
       .add_option("--bend", options.plan.bend_rad,
                   "with actuation by torque: largest step, as the bend in rad that the "
                   "configured stiffness would allow")
-      ->check(CLI::Range(0.01, 3.0))
+      ->check(number_between(0.01, 3.0))
       ->capture_default_str();
 }
 
@@ -204,7 +205,7 @@ void add_choice_options(CLI::App& command, Command& options) {
       .add_option("--prior", options.options.refinement.prior,
                   "how far, in parts of it, every number may be off what is configured (one "
                   "standard deviation); 0: nothing is known before")
-      ->check(CLI::Range(0.0, 1e6))
+      ->check(number_between(0.0, 1e6))
       ->capture_default_str();
 }
 
@@ -227,16 +228,16 @@ void add_identify_command(CLI::App& app) {
   command->add_flag("--compare", options->compare,
                     "what each term more buys, on the whole record and from half to half");
   auto* hold = command->add_option("--hold", options->plan.hold_s, "time between steps in s")
-                   ->check(CLI::Range(0.1, 100.0));
+                   ->check(number_between(0.1, 100.0));
   command
       ->add_option("--longest-lag", options->options.longest_lag_s,
                    "longest lag in s that the start of the search considers")
-      ->check(CLI::Range(0.0, 100.0))
+      ->check(number_between(0.0, 100.0))
       ->capture_default_str();
   command
       ->add_option("--window", options->options.window_s,
                    "width in s of the window that smooths for the start")
-      ->check(CLI::Range(0.005, 10.0))
+      ->check(number_between(0.005, 10.0))
       ->capture_default_str();
   auto* seed = command
                    ->add_option("--seed", options->seed,
@@ -250,7 +251,7 @@ void add_identify_command(CLI::App& app) {
   command
       ->add_option("--spread", options->study.spread,
                    "with --seeds: how far the truth is off the configured, at most")
-      ->check(CLI::Range(0.0, 0.9))
+      ->check(number_between(0.0, 0.9))
       ->capture_default_str();
   command->callback([options, seed, seeds, hold] {
     options->has_seed = seed->count() > 0;

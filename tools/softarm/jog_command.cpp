@@ -176,7 +176,7 @@ void add_jog_command(CLI::App& app) {
       ->check(CLI::PositiveNumber);
   command->add_option("PRESSURE", options->pressure_bar, "in bar")
       ->required()
-      ->check(CLI::Range(0.0, 1e3));
+      ->check(number_between(0.0, 1e3));
   command->callback([options] {
     if (const int code = jog(*options); code != kExitOk) throw CLI::RuntimeError(code);
   });

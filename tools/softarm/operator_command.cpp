@@ -1,13 +1,16 @@
 // softarm arm, disarm, estop, deadman: what a person asks of a running daemon.
 #include <fmt/format.h>
+#include <yaml-cpp/yaml.h>
 
 #include <chrono>
 #include <cstdio>
+#include <filesystem>
 #include <functional>
 #include <memory>
 #include <softarm_messages/controller_status_t.hpp>
 #include <softarm_messages/deadman_t.hpp>
 #include <softarm_messages/operator_command_t.hpp>
+#include <utility>
 
 #include "program.hpp"
 #include "signals.hpp"
@@ -26,8 +29,9 @@ using softarm_messages::controller_status_t;
 using Request = softarm_messages::operator_command_t;
 
 constexpr std::int64_t kPatience_ns = 2'000'000'000;
-constexpr std::int16_t kArmedFlag = 1 << 5;
+constexpr std::int16_t kShadowFlag = 1 << 4, kArmedFlag = 1 << 5;
 
+bool shadow(const controller_status_t& status) { return (status.flags & kShadowFlag) != 0; }
 bool armed(const controller_status_t& status) { return (status.flags & kArmedFlag) != 0; }
 bool faulty(const controller_status_t& status) {
   return static_cast<Mode>(status.mode) == Mode::fault;
@@ -68,15 +72,50 @@ std::string state_text(const controller_status_t& status) {
                      name(static_cast<Reason>(status.reason)));
 }
 
+/// What can be read of daemon.lcm in a configuration that is wrong somewhere; the rest by default.
+void read_network(const std::filesystem::path& file, LcmSettings& lcm, int includes_left = 8) {
+  try {
+    const YAML::Node root = YAML::LoadFile(file.string());
+    if (root["include"] && includes_left > 0)
+      read_network(file.parent_path() / root["include"].as<std::string>(), lcm, includes_left - 1);
+    const YAML::Node network = root["daemon"]["lcm"];
+    const std::pair<const char*, std::string*> keys[] = {
+        {"url", &lcm.url},
+        {"operator_channel", &lcm.operator_channel},
+        {"status_channel", &lcm.status_channel}};
+    for (const auto& [key, value] : keys)
+      if (network[key]) *value = network[key].as<std::string>();
+  } catch (const YAML::Exception&) {  // what was read so far is all there is
+  }
+}
+
+/// Whoever wants the arm vented must not be kept from it by a typo in a file.
+LcmSettings network_of(const std::string& config, const Kind& kind) {
+  try {
+    return load_experiment(config).daemon.lcm;
+  } catch (const ConfigError& error) {
+    if (kind.request == Request::ARM || !std::filesystem::exists(config)) throw;
+    print_error("softarm", error.what());
+    LcmSettings lcm;
+    read_network(config, lcm);
+    say(fmt::format("softarm: {} all the same, on {} of {}\n", kind.command, lcm.operator_channel,
+                    lcm.url));
+    return lcm;
+  }
+}
+
 /// Asks until the daemon's status shows it was understood.
 int request(const std::string& config, const Kind& kind) {
-  const Experiment experiment = load_experiment(config);
-  const LcmSettings& lcm = experiment.daemon.lcm;
+  const LcmSettings lcm = network_of(config, kind);
   LcmNode node(lcm.url);
   controller_status_t status{};
   bool heard = false;
-  node.subscribe(lcm.status_channel, 8,
-                 [&](const ReceivedMessage& packet) { heard |= decode(packet.bytes, status); });
+  node.subscribe(lcm.status_channel, 8, [&](const ReceivedMessage& packet) {
+    controller_status_t newest;
+    if (!decode(packet.bytes, newest) || shadow(newest)) return;
+    status = newest;
+    heard = true;
+  });
 
   const std::int64_t start_ns = monotonic_now_ns();
   for (std::int64_t now_ns = start_ns; now_ns - start_ns < kPatience_ns;
@@ -114,9 +153,9 @@ int hold_deadman(const std::string& config) {
   fmt::print("saying go on {} every {:.3g} s until Ctrl-C\n", lcm.deadman_channel,
              1e-9 * static_cast<double>(period_ns));
   std::fflush(stdout);
-  for (std::int64_t next_ns = monotonic_now_ns(); stop_requested == 0; next_ns += period_ns) {
+  while (stop_requested == 0) {
     node.publish(lcm.deadman_channel, softarm_messages::deadman_t{.sequence = date_ns(), .go = 1});
-    sleep_until_ns(next_ns + period_ns);
+    sleep_until_ns(monotonic_now_ns() + period_ns);  // after a stop of ours nothing is made up for
   }
   node.publish(lcm.deadman_channel, softarm_messages::deadman_t{.sequence = date_ns(), .go = 0});
   return kExitOk;

@@ -82,6 +82,8 @@ void say_report(const ReplayOptions& options, const ReplaySummary& summary,
   } else {
     fmt::print("{}\n", exit_code(summary, log) == kExitOk
                            ? "IDENTICAL: every command and status, bit for bit"
+                       : summary.records.compared + summary.commands.compared == 0
+                           ? "INCOMPLETE: nothing could be compared"
                            : "INCOMPLETE: what could be compared is identical, bit for bit");
   }
 }

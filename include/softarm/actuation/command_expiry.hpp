@@ -36,7 +36,9 @@ class CommandExpiry {
   static constexpr std::int64_t kNever = INT64_MAX;
 
   /// @param chambers number of set points in a command, >= 0 (std::invalid_argument otherwise).
-  explicit CommandExpiry(int chambers);
+  /// @param longest_ns what is valid for longer is so for this long only: a sender that mistakes a
+  /// unit must not hold the valves for minutes.
+  explicit CommandExpiry(int chambers, std::int64_t longest_ns = kNever);
 
   /// Takes a command that arrived at `arrival_ns` (times never go back).
   CommandVerdict receive(const PressureCommand& command, std::int64_t arrival_ns) noexcept;
@@ -53,6 +55,7 @@ class CommandExpiry {
   }  ///< zero while vented
 
  private:
+  std::int64_t longest_ns_;
   std::int64_t expires_ns_ = kNever;
   std::int64_t sequence_ = kNoSequence;
   Eigen::VectorXd set_points_bar_;

@@ -85,6 +85,7 @@ class ControlPipeline {
   std::int64_t period_ns() const noexcept { return period_ns_; }
 
  private:
+  void forget_expired_command(std::int64_t now_ns) noexcept;
   void validate_and_estimate(const TickInput& input, SafetyInput& safety) noexcept;
   void watch(const TickInput& input, SafetyInput& safety) noexcept;
   void use_frame(const MocapFrame& frame) noexcept;
@@ -94,7 +95,7 @@ class ControlPipeline {
   void control() noexcept;
   void limit(Mode mode) noexcept;
   bool poses_frozen() const noexcept;
-  bool beyond_soft_limit() const noexcept;
+  bool beyond_soft_limit(bool speed_too) const noexcept;
   double seconds(std::int64_t time_ns) const noexcept {
     return 1e-9 * static_cast<double>(time_ns - epoch_ns_);
   }
@@ -102,6 +103,7 @@ class ControlPipeline {
   PipelineSettings settings_;
   std::int64_t period_ns_;
   double period_s_;
+  std::int64_t validity_ns_;
   FrameValidator validator_;
   CurvatureFilter filter_;
   SafetyMonitor safety_;

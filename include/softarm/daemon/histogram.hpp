@@ -14,7 +14,7 @@ inline double bucket_edge_us(int bucket) noexcept {
 }
 
 inline constexpr int kDurationBuckets = 32;
-using DurationCounts = std::array<std::int32_t, kDurationBuckets>;
+using DurationCounts = std::array<std::int64_t, kDurationBuckets>;
 
 /// Upper edge of the bucket below which `fraction` of the durations lie; 0 when there are none.
 inline double quantile_us(const DurationCounts& counts, double fraction) noexcept {

@@ -54,6 +54,10 @@ class OtherInstance : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+/// What instances on an LCM channel lock. The options behind the '?' of a URL make no other
+/// network.
+std::string lock_name(const std::string& channel, const std::string& url);
+
 /// Held for the life of the process: keeps a second instance away from the same name. No file is
 /// left behind.
 class InstanceLock {

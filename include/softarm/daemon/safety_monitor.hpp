@@ -105,8 +105,9 @@ struct SafetyInput {
 /// Reads no clock, allocates nothing, throws nothing. Transitions follow the severity of the causes
 /// present: the most severe wins. Valves count as silent for as long as the monitor was stepped and
 /// did not hear them: what arrived while the daemon was stopped may have been dropped. After such a
-/// stop no frame is good before they have been heard again. While nothing is pressurised
-/// (WAIT_FRAMES) a cause that demands HOLD or VENT only keeps the arm from becoming active.
+/// stop no frame is good before they have been heard again, and for half a second no `arm` counts.
+/// While nothing is pressurised (WAIT_FRAMES) a cause that demands HOLD or VENT only keeps the arm
+/// from becoming active.
 class SafetyMonitor {
  public:
   SafetyMonitor(const SafetySettings& settings, double control_period_s) noexcept;
@@ -133,6 +134,7 @@ class SafetyMonitor {
   int good_in_a_row_ = 0;
   std::int64_t previous_tick_ns_ = 0;
   std::int64_t listening_since_ns_ = SafetyInput::kNever;  ///< end of the last stop, for the valves
+  std::int64_t deaf_until_ns_ = SafetyInput::kNever;       ///< to `arm`, after a stop
 };
 
 }  // namespace softarm

@@ -23,9 +23,11 @@ namespace softarm {
 /// Same settings, same calls: same bits.
 class SimulatedArm {
  public:
-  /// At rest, without pressure, vented; the first frame is captured at `start_ns`.
+  /// At rest, without pressure, vented; the first frame is captured at `start_ns`. No command is
+  /// valid for longer than `longest_validity_ns`.
   /// @throw std::invalid_argument as ArmPlant and MocapSimulator.
-  SimulatedArm(const PlantSettings& settings, std::int64_t start_ns);
+  SimulatedArm(const PlantSettings& settings, std::int64_t start_ns,
+               std::int64_t longest_validity_ns = CommandExpiry::kNever);
 
   /// Takes a command that arrives at `arrival_ns`, first letting time pass until then. @throw
   /// PlantError.

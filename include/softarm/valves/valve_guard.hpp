@@ -56,8 +56,9 @@ struct ValveGuardSettings {
   ValveDriverSettings driver;
   int chambers = 1;  ///< >= 1
   double max_pressure_bar = 2.0;
-  double rise_bar_per_s = 8.0;  ///< of set points on the way from vented to what is commanded
-  bool wait_for_zero = false;   ///< after a doubt (and at first) commands must have been zero once
+  double rise_bar_per_s = 8.0;      ///< of set points on the way from vented to what is commanded
+  double longest_validity_s = 0.1;  ///< of a command, whatever it says of itself
+  bool wait_for_zero = false;  ///< after a doubt (and at first) commands must have been zero once
 };
 
 /// What happened since the start of the driver.

@@ -47,11 +47,18 @@ TEST_P(PeopleAndValves, ArmDisarmEmergencyStopAndDeadMan) {
   EXPECT_EQ(ask("arm"), 0);
   ASSERT_TRUE(wait_for([&] { return under_pressure(); })) << daemon->printed();
 
-  // An emergency stop is latched: arming alone is refused, and the cure told.
-  EXPECT_EQ(ask("estop"), 0);
+  // Somebody edits the configuration: that keeps from arming, but not from an emergency stop.
+  std::string printed;
+  const std::filesystem::path good = config_;
+  config_ = folder_ / "typo.yaml";
+  std::ofstream(config_) << "include: " << good << "\nname: edited\ndaemon: {typo: 1}\n";
+  EXPECT_EQ(ask("arm"), 78);
+  // It is latched: arming alone is refused, and the cure told.
+  EXPECT_EQ(ask("estop", &printed), 0);
+  EXPECT_NE(printed.find("daemon.typo"), std::string::npos) << printed;
+  config_ = good;
   EXPECT_TRUE(becomes(*this, Mode::fault, Reason::emergency_stop)) << told();
   EXPECT_TRUE(vented()) << told();
-  std::string printed;
   EXPECT_EQ(ask("arm", &printed), 1);
   EXPECT_NE(printed.find("FAULT (emergency_stop); disarm first"), std::string::npos) << printed;
   EXPECT_EQ(mode(), Mode::fault) << told();

@@ -56,9 +56,12 @@ class Station {
       if (decode(packet.bytes, plant_)) ++plant_states_;
     });
     node_->subscribe("SOFTARM_PRESSURE_COMMAND", 4096, [this](const ReceivedMessage& packet) {
-      const std::vector<float> before = command_.pressure_bar;
-      const std::int64_t sequence = command_.sequence;
+      std::vector<float> before = command_.pressure_bar;
+      const std::int64_t sequence = command_.sequence, sent_us = command_.time_us;
       if (!decode(packet.bytes, command_)) return;
+      // The valves vent when a command expires: what comes after that is a step from zero.
+      if (command_.time_us - sent_us >= command_.validity_us)
+        std::fill(before.begin(), before.end(), 0.0F);
       ++commands_;
       for (std::size_t j = 0; j < command_.pressure_bar.size(); ++j) {
         const float now = command_.pressure_bar[j];

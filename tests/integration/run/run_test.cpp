@@ -110,14 +110,17 @@ TEST_F(Run, LeavesWhatItPromises) {
 }
 
 TEST_F(Run, WrongCommandLinesExitWith64) {
-  const std::vector<std::vector<std::string>> wrong{{},
-                                                    {"sprint"},
-                                                    {"run"},
-                                                    {"run", kPaperArm, "--no-such-option"},
-                                                    {"run", kPaperArm, "--duration", "-1"},
-                                                    {"run", kPaperArm, "--duration", "soon"},
-                                                    {"run", kPaperArm, "--seed", "x"},
-                                                    {"run", kPaperArm, "--seed", "-1"}};
+  const std::vector<std::vector<std::string>> wrong{
+      {},
+      {"sprint"},
+      {"run"},
+      {"run", kPaperArm, "--no-such-option"},
+      {"run", kPaperArm, "--duration", "-1"},
+      {"run", kPaperArm, "--duration", "soon"},
+      {"run", kPaperArm, "--seed", "x"},
+      {"run", kPaperArm, "--seed", "-1"},
+      {"jog", kPaperArm, "1", "1", "nan"},
+      {"check", kPaperArm, "--live", "--pulse", "--hold", "nan"}};
   for (const auto& arguments : wrong) EXPECT_EQ(start("softarm", arguments), 64) << printed;
   for (const char* program : {"softarmd", "softarm-plant"}) {
     EXPECT_EQ(start(program, {}), 64) << printed;

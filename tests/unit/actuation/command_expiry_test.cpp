@@ -94,6 +94,23 @@ TEST_F(Expiry, AVeryLongValidityDoesNotWrapAround) {
   EXPECT_FALSE(expiry.vented());
 }
 
+TEST(LongestValidity, CutsWhatASenderAsksFor) {
+  CommandExpiry expiry(1, 100 * kMs);
+  const std::array<double, 1> pressure{0.3};
+  // 2^31 us: nanoseconds taken for microseconds.
+  EXPECT_EQ(expiry.receive({.sequence = std::int64_t{1} << 62,
+                            .validity_ns = (std::int64_t{1} << 31) * 1000,
+                            .pressure_bar = pressure},
+                           5 * kMs),
+            CommandVerdict::in_force);
+  EXPECT_EQ(expiry.expires_ns(), 105 * kMs);
+  EXPECT_TRUE(expiry.update(105 * kMs));
+  EXPECT_EQ(
+      expiry.receive({.sequence = 1, .validity_ns = 50 * kMs, .pressure_bar = pressure}, 106 * kMs),
+      CommandVerdict::in_force)
+      << "others are heard again";
+}
+
 TEST_F(Expiry, NegativeCountsAreRefused) { EXPECT_THROW(CommandExpiry(-1), std::invalid_argument); }
 
 }  // namespace

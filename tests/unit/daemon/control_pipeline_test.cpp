@@ -195,6 +195,42 @@ TEST_F(Pipeline, AGapInTimeVentsAndForgetsWhatWasQueued) {
   EXPECT_EQ(bench.pipeline.counters().accepted, accepted);
 }
 
+// The valves vent while we are held up: what was commanded before is nothing to go on from.
+TEST_F(Pipeline, AfterAStallPressuresRiseFromZeroWithinTheSlew) {
+  Experiment slow = experiment;
+  slow.actuation.slew_bar_per_s = 2.0;
+  slow.daemon.safety.vent_after_s = 0.5;
+  const double step_bar = 2.0 / slow.daemon.rate_hz * (1.0 + 1e-12);
+  for (const std::int64_t stall_ms : {110, 300, 1000}) {
+    PipelineBench bench(slow);
+    bend(bench);
+    bench.now_ns += stall_ms * kMs;
+    bench.next_capture_ns = bench.now_ns;
+    for (int k = 1; k <= 20; ++k)
+      ASSERT_LE(bench.tick().pressure_bar.maxCoeff(), k * step_bar) << stall_ms << " ms, " << k;
+  }
+}
+
+TEST_F(Pipeline, ASoftLimitCountsInHoldWhileTheArmIsSeen) {
+  PipelineBench bench(experiment);
+  bend(bench);
+  bool spoil = true;  // one frame in 20 is bad: HOLD does not end
+  bench.spoil = [&](MocapFrame& frame) {
+    if (spoil && frame.frame_number % 20 == 0) frame.body[1].valid = false;
+    return true;
+  };
+  bench.publishing = false;
+  ASSERT_GT(bench.run_to(Mode::hold, 50), 0);
+  bench.publishing = true;
+  bench.moves = false;
+  for (int k = 0; k < 1000 && bench.pipeline.output().mode == Mode::hold; ++k) {
+    bench.u *= 1.003;
+    bench.tick();
+  }
+  EXPECT_EQ(bench.pipeline.output().mode, Mode::vent);
+  EXPECT_EQ(bench.pipeline.output().reason, Reason::soft_limit);
+}
+
 TEST_F(Pipeline, AfterVentTheReferenceIsJoinedFromWhereTheArmIs) {
   PipelineBench bench(experiment);
   bend(bench);

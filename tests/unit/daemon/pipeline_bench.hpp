@@ -148,13 +148,16 @@ class PipelineBench {
 class PressureLimits {
  public:
   explicit PressureLimits(const Experiment& experiment)
-      : settings_(experiment.actuation), period_s_(1.0 / experiment.daemon.rate_hz) {}
+      : settings_(experiment.actuation),
+        period_s_(1.0 / experiment.daemon.rate_hz),
+        validity_s_(experiment.daemon.lcm.command_validity_s) {}
 
-  /// Empty, or what is wrong.
-  const char* violation(const TickOutput& output) {
+  /// Empty, or what is wrong; `gap_s` after the tick before.
+  const char* violation(const TickOutput& output, double gap_s = 0.0) {
     const PressureVector& now = output.pressure_bar;
     const char* wrong = "";
-    if (before_.size() == 0) before_ = PressureVector::Zero(now.size());
+    // Held up for longer the valves have vented, and pressures rise from there.
+    if (before_.size() == 0 || gap_s >= validity_s_) before_ = PressureVector::Zero(now.size());
     const double rate =
         output.mode == Mode::active ? settings_.slew_bar_per_s : settings_.vent_bar_per_s;
     for (Eigen::Index j = 0; j < now.size(); ++j) {
@@ -172,7 +175,7 @@ class PressureLimits {
 
  private:
   ActuationSettings settings_;
-  double period_s_;
+  double period_s_, validity_s_;
   PressureVector before_;
 };
 

@@ -42,7 +42,9 @@ class Promises {
         oldest == SafetyInput::kNever || bench_.now_ns - oldest > thresholds_.vent_after_ns;
     const Mode mode = output.mode;
 
-    std::string wrong = limits_.violation(output);
+    const double gap_s = 1e-9 * static_cast<double>(bench_.now_ns - previous_ns_);
+    previous_ns_ = bench_.now_ns;
+    std::string wrong = limits_.violation(output, gap_s);
     if (mode == Mode::active && !fresh) wrong = "ACTIVE without fresh frames of every segment";
     if (mode == Mode::active && !output.motion.all_valid())
       wrong = "ACTIVE with an unknown segment";
@@ -78,6 +80,7 @@ class Promises {
   std::array<std::int64_t, 3> newest_{};
   Mode before_ = Mode::init;
   bool vented_before_ = true;
+  std::int64_t previous_ns_ = 0;
   int venting_ = 0, vent_ticks_ = 0;
 };
 

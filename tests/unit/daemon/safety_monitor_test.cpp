@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <functional>
 #include <random>
 
 namespace softarm {
@@ -124,6 +125,47 @@ TEST(SafetyMonitor, ArmingIsNotStoredUpForLater) {
   bench.tick();
   bench.frames_per_tick = 1;
   EXPECT_EQ(bench.run(200), Mode::wait_frames) << "armed when nobody could see the arm";
+}
+
+TEST(SafetyMonitor, AnArmingThatWaitsForFramesIsTakenBackByWhatWouldVent) {
+  const std::function<void(Bench&)> causes[] = {
+      [](Bench& bench) { bench.input.sender_restarted = true; },
+      [](Bench& bench) { bench.input.newest_capture_ns = bench.input.now_ns - 3000 * kMs; },
+      [](Bench& bench) { bench.input.deadman_used = true; }};
+  for (const auto& cause : causes) {
+    Bench bench(Arming::explicit_);
+    bench.input.fully_vented = true;
+    bench.run(10);
+    bench.input.arm = true;
+    bench.tick();
+    ASSERT_TRUE(bench.monitor.armed());
+    bench.frames_per_tick = 0;
+    cause(bench);
+    bench.tick();
+    bench.input.deadman_used = false;
+    bench.frames_per_tick = 1;
+    EXPECT_EQ(bench.run(200), Mode::wait_frames);
+    EXPECT_EQ(bench.monitor.reason(), Reason::waiting_for_arm);
+  }
+}
+
+TEST(SafetyMonitor, AnArmThatQueuedUpDuringAStopDoesNotCount) {
+  for (const Arming arming : {Arming::explicit_, Arming::automatic}) {
+    Bench bench(arming);
+    bench.input.fully_vented = true;
+    bench.run(100);
+    bench.input.disarm = true;
+    bench.tick();
+    bench.tick(4000 * kMs);
+    for (int k = 0; k < 200; ++k) {  // 0.4 s of what is left in a socket
+      bench.input.arm = true;
+      bench.tick();
+    }
+    EXPECT_FALSE(bench.monitor.armed());
+    bench.run(60);
+    bench.input.arm = true;
+    EXPECT_EQ(bench.tick(), Mode::active);
+  }
 }
 
 TEST(SafetyMonitor, HoldEndsAfterFiftyGoodFrames) {
