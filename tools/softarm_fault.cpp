@@ -77,10 +77,8 @@ void send_packets(const std::string& url, const std::vector<Packet>& packets, do
 
 /// Sends malformed packets, four a millisecond: real messages find their place between them.
 void send_malformed(const Experiment& experiment, long packets) {
-  std::size_t chambers = 0;
-  for (const auto& segment : experiment.actuation.segments) chambers += segment.size();
-  HostilePackets hostile(experiment.daemon.lcm, experiment.arm.size(), static_cast<int>(chambers),
-                         std::random_device{}());
+  HostilePackets hostile(experiment.daemon.lcm, experiment.arm.size(),
+                         chamber_count(experiment.actuation), std::random_device{}());
   RawSender sender(experiment.daemon.lcm.url);
   const std::int64_t start_ns = monotonic_now_ns();
   std::int64_t told_ns = start_ns;

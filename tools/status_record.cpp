@@ -95,7 +95,7 @@ bool StatusRecord::take_status(std::span<const std::byte> bytes) {
   row.t_s = 1e-6 * static_cast<double>(time_us - start_us_);
   row.mode = static_cast<Mode>(std::clamp<int>(status_.mode, 0, static_cast<int>(Mode::fault)));
   row.reason = static_cast<Reason>(std::clamp<int>(status_.reason, 0, kReasons - 1));
-  row.saturated = (status_.flags & 1) != 0;
+  row.saturated = (status_.flags & status_.SATURATED) != 0;
   row.frame_age_s = status_.frame_age_s;
   row.u = flatten(status_.u_rad);
   row.velocity = flatten(status_.velocity_radps);

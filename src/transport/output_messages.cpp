@@ -9,11 +9,15 @@ namespace softarm {
 namespace {
 
 std::int16_t flags_of(const TickOutput& output, bool shadow) noexcept {
-  const bool bits[] = {
-      output.saturated, output.slew_limited, output.reference_limited, output.soft_limit, shadow,
-      output.armed,     output.bounded};
+  using Status = softarm_messages::controller_status_t;
   int flags = 0;
-  for (int k = 0; k < 7; ++k) flags |= bits[k] ? 1 << k : 0;
+  if (output.saturated) flags |= Status::SATURATED;
+  if (output.slew_limited) flags |= Status::SLEW_LIMITED;
+  if (output.reference_limited) flags |= Status::REFERENCE_LIMITED;
+  if (output.soft_limit) flags |= Status::SOFT_LIMIT;
+  if (shadow) flags |= Status::SHADOW;
+  if (output.armed) flags |= Status::ARMED;
+  if (output.bounded) flags |= Status::BOUNDED;
   return static_cast<std::int16_t>(flags);
 }
 
@@ -41,8 +45,7 @@ OutputMessages::OutputMessages(const PipelineSettings& settings, const Provenanc
       status{},
       by_torque_(settings.actuation.kind == ActuationKind::torque) {
   const auto segments = static_cast<std::size_t>(settings.arm.size());
-  std::size_t chambers = 0;
-  for (const auto& segment : settings.actuation.segments) chambers += segment.size();
+  const auto chambers = static_cast<std::size_t>(chamber_count(settings.actuation));
 
   // Everything that grows is grown here, so that the loop never has to.
   pressure_command.shadow = shadow ? 1 : 0;

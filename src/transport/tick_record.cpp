@@ -76,8 +76,7 @@ void get(const tick_frame_t& from, MocapFrame& frame) {
 tick_record_t largest_record(const PipelineSettings& settings, const std::string& build) {
   tick_record_t record{};
   const auto dof = static_cast<std::size_t>(settings.arm.dof());
-  std::size_t chambers = 0;
-  for (const auto& segment : settings.actuation.segments) chambers += segment.size();
+  const auto chambers = static_cast<std::size_t>(chamber_count(settings.actuation));
   record.num_chambers = static_cast<std::int16_t>(chambers);
   record.pressure_bar.resize(chambers);
   record.num_measured = record.num_chambers;

@@ -269,12 +269,11 @@ void Scene::run(const std::function<void(const std::string&)>& progress) {
   const RealtimeSettings realtime{.fifo = result_.fifo, .priority = kPriority, .cpu = options_.cpu};
   SharedWakeUps wake_ups(
       static_cast<std::size_t>((options_.seconds + 2.0 * kPatience_s) * options_.rate_hz));
-  std::size_t chambers = 0;
-  for (const auto& segment : experiment_.actuation.segments) chambers += segment.size();
   // Before this process has a thread of LCM's.
   const ForkedPeer sleeper([&] { wake_ups.sleep_forever(period_ns_, realtime); });
-  const ForkedPeer echo(
-      [&] { echo_forever(experiment_.daemon.lcm.url, static_cast<int>(chambers), realtime); });
+  const ForkedPeer echo([&] {
+    echo_forever(experiment_.daemon.lcm.url, chamber_count(experiment_.actuation), realtime);
+  });
   ChildProcess daemon(program_beside_this("softarmd"), {(folder_ / "loop.yaml").string()},
                       (folder_ / "softarmd.txt").string());
   std::vector<std::unique_ptr<ForkedPeer>> load;

@@ -49,7 +49,7 @@ class LogReader {
         estimator_(experiment.estimation, experiment.arm,
                    body_noise(experiment.estimation, experiment.arm.size(),
                               experiment.daemon.bodies.base_id < 0)) {
-    for (const auto& chambers : experiment.actuation.segments) chambers_ += chambers.size();
+    chambers_ = static_cast<std::size_t>(chamber_count(experiment.actuation));
   }
 
   void take(const lcm::LogEvent& event) {

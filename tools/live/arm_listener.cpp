@@ -15,7 +15,6 @@ namespace {
 constexpr int kQueue = 1024;
 constexpr std::int64_t kSpeedSpan_ns = 50'000'000;  ///< so far apart, noise is no speed
 constexpr std::int64_t kStatusCounts_ns = 1'000'000'000;
-constexpr std::int16_t kShadowFlag = 1 << 4, kArmedFlag = 1 << 5;
 
 std::int64_t wall_now_ns() {
   return std::chrono::duration_cast<std::chrono::nanoseconds>(
@@ -58,7 +57,7 @@ ArmListener::ArmListener(const Experiment& experiment, LcmNode& node, bool keep)
   });
   node.subscribe(lcm.status_channel, kQueue, [this](const ReceivedMessage& packet) {
     // A shadow commands nothing.
-    if (decode(packet.bytes, status_) && (status_.flags & kShadowFlag) == 0)
+    if (decode(packet.bytes, status_) && (status_.flags & status_.SHADOW) == 0)
       status_ns_ = monotonic_now_ns();
   });
 }
@@ -146,7 +145,7 @@ double ArmListener::fastest_radps() const {
 bool ArmListener::daemon_armed(std::int64_t now_ns) const {
   if (status_ns_ == kNever || now_ns - status_ns_ > kStatusCounts_ns) return false;
   const auto mode = static_cast<Mode>(status_.mode);
-  return (status_.flags & kArmedFlag) != 0 || mode == Mode::active || mode == Mode::hold;
+  return (status_.flags & status_.ARMED) != 0 || mode == Mode::active || mode == Mode::hold;
 }
 
 std::string ArmListener::other_commander() const {

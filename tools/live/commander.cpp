@@ -11,12 +11,6 @@ constexpr std::int64_t kRest_ns = 1'000'000'000;
 
 }  // namespace
 
-int chamber_count(const ActuationSettings& actuation) {
-  std::size_t count = 0;
-  for (const auto& chambers : actuation.segments) count += chambers.size();
-  return static_cast<int>(count);
-}
-
 Commander::Commander(const Experiment& experiment, LcmNode& node)
     : lock_(lock_name(experiment.daemon.lcm.command_channel, experiment.daemon.lcm.url)),
       node_(node),

@@ -45,7 +45,4 @@ class Commander {
   softarm_messages::pressure_command_t message_;
 };
 
-/// Number of chambers of the whole arm.
-int chamber_count(const ActuationSettings& actuation);
-
 }  // namespace softarm

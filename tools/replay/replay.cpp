@@ -82,8 +82,7 @@ bool Replay::fits(const tick_record_t& record) const {
     return frame.num_bodies == experiment_.arm.size() + 1 && frame.capture_ns > -kMost &&
            frame.capture_ns < kMost;
   };
-  std::size_t chambers = 0;
-  for (const auto& segment : experiment_.actuation.segments) chambers += segment.size();
+  const auto chambers = static_cast<std::size_t>(chamber_count(experiment_.actuation));
   return record.tick > 0 && sane(record.tick) && sane(record.first_ns) && sane(record.now_ns) &&
          record.pressure_bar.size() == chambers &&
          (record.dimension == 0 || record.dimension == dof) &&

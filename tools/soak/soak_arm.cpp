@@ -17,7 +17,6 @@ constexpr std::int64_t kReferencePeriod_ns = kSecond_ns / 100;
 constexpr std::int64_t kGoPeriod_ns = kSecond_ns / 25;
 constexpr double kMostTheta_rad = 0.8;
 constexpr int kPoses = 100;
-constexpr int kReferenceLimited = 1 << 2;  ///< of the status' flags
 /// Of the limit of a step, for its rounding to float on the wire.
 constexpr double kRounding = 1.00001;
 
@@ -85,7 +84,7 @@ void SoakArm::take_status(const ReceivedMessage& packet) {
   }
   const bool begins = mode() != Mode::active && static_cast<Mode>(decoded_.mode) == Mode::active;
   status_ = decoded_;
-  const bool refused = mode() == Mode::active && (status_.flags & kReferenceLimited) != 0 &&
+  const bool refused = mode() == Mode::active && (status_.flags & status_.REFERENCE_LIMITED) != 0 &&
                        monotonic_now_ns() - motion_began_ns_ > kSecond_ns;
   if (begins || refused) begin_motion();
   for (std::size_t i = 0; i < std::min(followed_.size(), status_.reference_u_rad.size()); ++i) {

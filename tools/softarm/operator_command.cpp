@@ -29,10 +29,13 @@ using softarm_messages::controller_status_t;
 using Request = softarm_messages::operator_command_t;
 
 constexpr std::int64_t kPatience_ns = 2'000'000'000;
-constexpr std::int16_t kShadowFlag = 1 << 4, kArmedFlag = 1 << 5;
 
-bool shadow(const controller_status_t& status) { return (status.flags & kShadowFlag) != 0; }
-bool armed(const controller_status_t& status) { return (status.flags & kArmedFlag) != 0; }
+bool shadow(const controller_status_t& status) {
+  return (status.flags & controller_status_t::SHADOW) != 0;
+}
+bool armed(const controller_status_t& status) {
+  return (status.flags & controller_status_t::ARMED) != 0;
+}
 bool faulty(const controller_status_t& status) {
   return static_cast<Mode>(status.mode) == Mode::fault;
 }

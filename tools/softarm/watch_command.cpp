@@ -4,9 +4,9 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <memory>
+#include <utility>
 
 #include "program.hpp"
 #include "progress.hpp"
@@ -82,12 +82,18 @@ class LiveView {
   static constexpr int kShownSegments = 12;
 
   static std::string flag_text(std::int16_t flags) {
-    constexpr std::array kNames{"saturated",  "slew limited", "reference limited",
-                                "soft limit", "shadow",       "armed",
-                                "bounded"};
+    using Status = softarm_messages::controller_status_t;
+    constexpr std::pair<std::int16_t, const char*> kNames[] = {
+        {Status::SATURATED, "saturated"},
+        {Status::SLEW_LIMITED, "slew limited"},
+        {Status::REFERENCE_LIMITED, "reference limited"},
+        {Status::SOFT_LIMIT, "soft limit"},
+        {Status::SHADOW, "shadow"},
+        {Status::ARMED, "armed"},
+        {Status::BOUNDED, "bounded"}};
     std::string text;
-    for (std::size_t bit = 0; bit < kNames.size(); ++bit)
-      if ((flags >> bit & 1) != 0) text += fmt::format("   {}", kNames[bit]);
+    for (const auto& [flag, name] : kNames)
+      if ((flags & flag) != 0) text += fmt::format("   {}", name);
     return text;
   }
 

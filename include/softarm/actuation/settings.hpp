@@ -35,6 +35,13 @@ struct ActuationSettings {
   std::optional<double> plane_rad;  ///< a planar arm bends only in the plane at this phi
 };
 
+/// Number of chambers, or moments, of the whole arm.
+inline int chamber_count(const ActuationSettings& settings) {
+  std::size_t count = 0;
+  for (const auto& chambers : settings.segments) count += chambers.size();
+  return static_cast<int>(count);
+}
+
 /// Turns settings for `segments` segments into actuation by torque within +-`max_torque_nm`.
 inline void set_torque_actuation(ActuationSettings& settings, int segments, double max_torque_nm) {
   settings.kind = ActuationKind::torque;

@@ -14,8 +14,6 @@ using namespace std::chrono_literals;
 using test::FaultTest;
 using test::Station;
 
-constexpr int kSaturated = 1 << 0, kSlewLimited = 1 << 1, kBounded = 1 << 6;
-
 std::size_t count(const std::string& text, const std::string& word) {
   std::size_t found = 0;
   for (std::size_t at = text.find(word); at != std::string::npos; at = text.find(word, at + 1))
@@ -107,11 +105,11 @@ TEST_P(MessagesAndLimits, ReferencesOutOfReachAndThroughTheStraightPoseStayBound
     processes.push_back(start_plant(station));
     processes.push_back(station.start("softarmd"));
   }
-  EXPECT_TRUE(wait_for([&] { return (flags_seen_ & kBounded) != 0; }))
+  EXPECT_TRUE(wait_for([&] { return (flags_seen_ & status_.BOUNDED) != 0; }))
       << told() << processes[1]->printed();
   EXPECT_TRUE(unreachable.wait_for([&] {
-    return (unreachable.flags_seen_ & kSaturated) != 0 &&
-           (unreachable.flags_seen_ & kSlewLimited) != 0;
+    return (unreachable.flags_seen_ & status_.SATURATED) != 0 &&
+           (unreachable.flags_seen_ & status_.SLEW_LIMITED) != 0;
   })) << unreachable.told()
       << processes[3]->printed();
   EXPECT_TRUE(stays_active(unreachable)) << unreachable.told() << processes[3]->printed();
@@ -138,7 +136,7 @@ TEST_P(MessagesAndLimits, TheSingularPoseOfTheCouplesStaysBounded) {
     // A busy machine may drive the arm beyond its soft limit first.
     if (reason() == Reason::waiting_for_arm && ++arm.sequence % 10 == 0)
       node_->publish("SOFTARM_OPERATOR", arm);
-    return (flags_seen_ & kBounded) != 0;
+    return (flags_seen_ & status_.BOUNDED) != 0;
   };
   EXPECT_TRUE(wait_for(bounded, 30.0)) << told() << daemon->printed();
   const int commands = commands_;
