@@ -56,9 +56,12 @@ ArmListener::ArmListener(const Experiment& experiment, LcmNode& node, bool keep)
       seen_.commanded_by_others = true;
   });
   node.subscribe(lcm.status_channel, kQueue, [this](const ReceivedMessage& packet) {
-    // A shadow commands nothing.
-    if (decode(packet.bytes, status_) && (status_.flags & status_.SHADOW) == 0)
-      status_ns_ = monotonic_now_ns();
+    // A shadow commands nothing, and must not hide what the daemon says.
+    if (!decode(packet.bytes, newest_status_) ||
+        (newest_status_.flags & newest_status_.SHADOW) != 0)
+      return;
+    status_ = newest_status_;
+    status_ns_ = monotonic_now_ns();
   });
 }
 

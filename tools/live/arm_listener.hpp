@@ -85,7 +85,7 @@ class ArmListener {
   CurvatureEstimate estimate_;
   softarm_messages::pressure_measurement_t measurement_message_;
   softarm_messages::pressure_command_t command_message_;
-  softarm_messages::controller_status_t status_;
+  softarm_messages::controller_status_t status_, newest_status_;
 };
 
 }  // namespace softarm

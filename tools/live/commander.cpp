@@ -28,6 +28,7 @@ Commander::Commander(const Experiment& experiment, LcmNode& node)
 
 void Commander::update(const PressureVector& wanted_bar, double rate_bar_per_s,
                        std::int64_t now_ns) {
+  forget_expired_command(now_ns);
   ActuationSettings limits = experiment_.actuation;
   limits.segments.clear();
   limits.slew_bar_per_s = std::min(limits.slew_bar_per_s, rate_bar_per_s);
@@ -36,6 +37,7 @@ void Commander::update(const PressureVector& wanted_bar, double rate_bar_per_s,
 }
 
 void Commander::vent(std::int64_t now_ns) {
+  forget_expired_command(now_ns);
   vent_ramps_.vent(bar_, step_s(now_ns), bar_);
   send(now_ns);
 }
@@ -49,10 +51,13 @@ void Commander::vent_to_rest() {
   }
 }
 
-// No step makes up for a stall. One that a command does not outlive has vented the valves: the
-// ramp begins anew at zero.
-double Commander::step_s(std::int64_t now_ns) {
+// A stall that the last command did not outlive has vented the valves.
+void Commander::forget_expired_command(std::int64_t now_ns) {
   if (now_ns - sent_ns_ >= 1000 * std::int64_t{message_.validity_us}) bar_.setZero();
+}
+
+// No step makes up for a stall.
+double Commander::step_s(std::int64_t now_ns) {
   const std::int64_t passed_ns = std::clamp<std::int64_t>(now_ns - updated_ns_, 0, period_ns_);
   updated_ns_ = now_ns;
   return 1e-9 * static_cast<double>(passed_ns);

@@ -33,6 +33,7 @@ class Commander {
   int chambers() const { return static_cast<int>(bar_.size()); }
 
  private:
+  void forget_expired_command(std::int64_t now_ns);
   double step_s(std::int64_t now_ns);
   void send(std::int64_t now_ns);
 

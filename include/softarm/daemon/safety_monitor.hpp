@@ -107,7 +107,7 @@ struct SafetyInput {
 /// did not hear them: what arrived while the daemon was stopped may have been dropped. After such a
 /// stop no frame is good before they have been heard again, and for half a second no `arm` counts.
 /// While nothing is pressurised (WAIT_FRAMES) a cause that demands HOLD or VENT only keeps the arm
-/// from becoming active.
+/// from becoming active; with explicit arming one that demands VENT takes the arming back.
 class SafetyMonitor {
  public:
   SafetyMonitor(const SafetySettings& settings, double control_period_s) noexcept;
