@@ -360,17 +360,19 @@ class ValvesAtPymodbus : public ValvesProgram {
     int now = -1, largest = -1, negative = -1, timeout_ms = -1;
   };
   State state_of_terminal() {
-    const auto states = [this] {
-      const std::string printed = terminal_->printed();
-      return std::count(printed.begin(), printed.end(), '\n');
+    // pymodbus logs between the answers.
+    const std::regex answer("state (\\d+) (\\d+) (\\d+) (\\d+)\n");
+    std::string printed;
+    const auto answers = [&] {
+      printed = terminal_->printed();
+      return std::distance(std::sregex_iterator(printed.begin(), printed.end(), answer), {});
     };
-    const auto before = states();
+    const auto before = answers();
     order("state");
-    wait_for([&] { return states() > before; });
-    const std::string printed = terminal_->printed();
+    EXPECT_TRUE(wait_for([&] { return answers() > before; })) << printed;
     State state;
-    std::istringstream(printed.substr(printed.rfind("state") + 5)) >> state.now >> state.largest >>
-        state.negative >> state.timeout_ms;
+    for (std::sregex_iterator at(printed.begin(), printed.end(), answer), end; at != end; ++at)
+      state = {std::stoi((*at)[1]), std::stoi((*at)[2]), std::stoi((*at)[3]), std::stoi((*at)[4])};
     return state;
   }
 
