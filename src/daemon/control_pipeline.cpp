@@ -20,7 +20,6 @@ ControlPipeline::ControlPipeline(const PipelineSettings& settings)
     : settings_(settings),
       period_ns_(to_ns(1.0 / settings.daemon.rate_hz)),
       period_s_(1.0 / settings.daemon.rate_hz),
-      validity_ns_(to_ns(settings.daemon.lcm.command_validity_s)),
       validator_(
           settings.estimation, settings.arm,
           body_noise(settings.estimation, settings.arm.size(), settings.daemon.bodies.base_id < 0)),
@@ -41,7 +40,7 @@ ControlPipeline::ControlPipeline(const PipelineSettings& settings)
 
 const TickOutput& ControlPipeline::tick(const TickInput& input) noexcept {
   if (!ticked_) epoch_ns_ = input.now_ns;
-  forget_expired_command(input.now_ns);
+  if (input.command_expired) forget_command();
   SafetyInput safety;
   validate_and_estimate(input, safety);
 
@@ -78,10 +77,8 @@ const TickOutput& ControlPipeline::tick(const TickInput& input) noexcept {
   return output_;
 }
 
-/// Held up for longer than a command is valid, we find an arm that the valves have vented: its
-/// pressures rise from zero again, within the slew.
-void ControlPipeline::forget_expired_command(std::int64_t now_ns) noexcept {
-  if (!ticked_ || now_ns - previous_ns_ < validity_ns_) return;
+/// The valves have vented: pressures rise from zero again, within the slew.
+void ControlPipeline::forget_command() noexcept {
   previous_bar_.setZero();
   output_.pressure_bar.setZero();
   pressure_watch_.reset();

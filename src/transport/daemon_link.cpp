@@ -68,6 +68,7 @@ TickInput DaemonLink::collect(std::int64_t now_ns) noexcept {
   frame_count_ = 0;
   input_ = {};
   input_.now_ns = now_ns;
+  input_.command_expired = command_expired(now_ns / 1000);
   node_.drain(static_cast<int>(mocap_.channels().size()) * kFrameCapacity + 4 * kOtherCapacity);
   if (frame_count_ < frames_.size() && mocap_.overdue(now_ns, frames_[frame_count_]))
     ++frame_count_;
@@ -154,11 +155,21 @@ void DaemonLink::take_go(const ReceivedMessage& packet) noexcept {
 
 void DaemonLink::publish_command(std::int64_t now_ns, const TickOutput& output) noexcept {
   messages_.set_command(++commands_, output);
-  messages_.pressure_command.time_us = messages_.torque_command.time_us = now_ns / 1000;
+  const std::int64_t now_us = now_ns / 1000;
+  if (command_expired(now_us) && !input_.command_expired) {
+    ++unsent_;
+    return;
+  }
+  messages_.pressure_command.time_us = messages_.torque_command.time_us = now_us;
   const std::string& channel = settings_.lcm.command_channel;
   const bool sent = messages_.by_torque() ? node_.publish(channel, messages_.torque_command)
                                           : node_.publish(channel, messages_.pressure_command);
+  if (sent) sent_us_ = now_us;
   if (!sent) ++unsent_;
+}
+
+bool DaemonLink::command_expired(std::int64_t now_us) const noexcept {
+  return now_us - sent_us_ >= messages_.pressure_command.validity_us;
 }
 
 void DaemonLink::publish_status(std::int64_t now_ns, const ControlPipeline& pipeline,

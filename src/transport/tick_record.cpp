@@ -108,7 +108,7 @@ bool is_intact(std::span<const std::byte> encoded) noexcept {
 void to_record(const TickInput& input, tick_record_t& record) {
   // A new field of TickInput stops the build here: it belongs into lcmtypes/tick_record_t.lcm, into
   // this function, into RecordedInput::from and into the size that decode() checks.
-  const auto& [now_ns, frames, reference, arm, disarm, emergency_stop, shutdown,
+  const auto& [now_ns, frames, reference, arm, disarm, emergency_stop, shutdown, command_expired,
                consecutive_overruns, newest_measurement_ns, measured_bar, newest_go_ns] = input;
   record.now_ns = now_ns;
   record.num_frames = static_cast<std::int16_t>(frames.size());
@@ -126,6 +126,7 @@ void to_record(const TickInput& input, tick_record_t& record) {
   record.disarm = disarm ? 1 : 0;
   record.emergency_stop = emergency_stop ? 1 : 0;
   record.shutdown = shutdown ? 1 : 0;
+  record.command_expired = command_expired ? 1 : 0;
   record.consecutive_overruns = consecutive_overruns;
   record.newest_measurement_ns = newest_measurement_ns;
   record.newest_go_ns = newest_go_ns;
@@ -156,6 +157,7 @@ const TickInput& RecordedInput::from(const tick_record_t& record) {
   input_.disarm = record.disarm != 0;
   input_.emergency_stop = record.emergency_stop != 0;
   input_.shutdown = record.shutdown != 0;
+  input_.command_expired = record.command_expired != 0;
   input_.consecutive_overruns = record.consecutive_overruns;
   input_.newest_measurement_ns = record.newest_measurement_ns;
   input_.newest_go_ns = record.newest_go_ns;

@@ -24,11 +24,11 @@ Commander::Commander(const Experiment& experiment, LcmNode& node)
   message_.shadow = 0;
   message_.num_chambers = static_cast<std::int16_t>(bar_.size());
   message_.sequence = 0;
+  message_.time_us = 0;
 }
 
 void Commander::update(const PressureVector& wanted_bar, double rate_bar_per_s,
                        std::int64_t now_ns) {
-  forget_expired_command(now_ns);
   ActuationSettings limits = experiment_.actuation;
   limits.segments.clear();
   limits.slew_bar_per_s = std::min(limits.slew_bar_per_s, rate_bar_per_s);
@@ -37,7 +37,6 @@ void Commander::update(const PressureVector& wanted_bar, double rate_bar_per_s,
 }
 
 void Commander::vent(std::int64_t now_ns) {
-  forget_expired_command(now_ns);
   vent_ramps_.vent(bar_, step_s(now_ns), bar_);
   send(now_ns);
 }
@@ -51,11 +50,6 @@ void Commander::vent_to_rest() {
   }
 }
 
-// A stall that the last command did not outlive has vented the valves.
-void Commander::forget_expired_command(std::int64_t now_ns) {
-  if (now_ns - sent_ns_ >= 1000 * std::int64_t{message_.validity_us}) bar_.setZero();
-}
-
 // No step makes up for a stall.
 double Commander::step_s(std::int64_t now_ns) {
   const std::int64_t passed_ns = std::clamp<std::int64_t>(now_ns - updated_ns_, 0, period_ns_);
@@ -66,9 +60,11 @@ double Commander::step_s(std::int64_t now_ns) {
 void Commander::send(std::int64_t now_ns) {
   if (now_ns < next_ns_) return;
   next_ns_ = now_ns + period_ns_;
-  sent_ns_ = now_ns;
+  // A stall that the last command did not outlive, were it since `now_ns`, has vented the valves.
+  const std::int64_t sent_us = monotonic_now_ns() / 1000;
+  if (sent_us - message_.time_us >= message_.validity_us) bar_.setZero();
   ++message_.sequence;
-  message_.time_us = now_ns / 1000;
+  message_.time_us = sent_us;
   message_.pressure_bar.assign(bar_.begin(), bar_.end());
   if (!node_.publish(experiment_.daemon.lcm.command_channel, message_))
     throw TransportError("a command could not be sent: see tools/with_loopback_network --check");

@@ -33,7 +33,6 @@ class Commander {
   int chambers() const { return static_cast<int>(bar_.size()); }
 
  private:
-  void forget_expired_command(std::int64_t now_ns);
   double step_s(std::int64_t now_ns);
   void send(std::int64_t now_ns);
 
@@ -42,7 +41,7 @@ class Commander {
   const Experiment& experiment_;
   PressureRamps vent_ramps_;
   PressureVector bar_;
-  std::int64_t period_ns_, next_ns_ = 0, updated_ns_ = 0, sent_ns_ = 0;
+  std::int64_t period_ns_, next_ns_ = 0, updated_ns_ = 0;
   softarm_messages::pressure_command_t message_;
 };
 

@@ -98,20 +98,12 @@ void SoakArm::take_status(const ReceivedMessage& packet) {
 }
 
 void SoakArm::take_command(const ReceivedMessage& packet) {
-  std::vector<float> before = command_.pressure_bar;
-  const std::int64_t sequence = command_.sequence, sent_us = command_.time_us;
   if (!decode(packet.bytes, command_)) return;  // bytes of our own that are no command
   ++commands_;
-  // One that comes after the validity of the one before, or from a new daemon, finds vented valves.
-  const bool lapsed = command_.time_us - sent_us >= command_.validity_us;
-  if (lapsed) std::fill(before.begin(), before.end(), 0.0F);
-  const bool follows = command_.sequence == sequence + 1 || (lapsed && command_.sequence == 1);
-  bool inside = true;
-  for (std::size_t j = 0; j < command_.pressure_bar.size(); ++j) {
-    const auto now = static_cast<double>(command_.pressure_bar[j]);
-    inside &= std::isfinite(now) && now >= std::min(0.0, lowest_bar_) && now <= highest_bar_;
-    if (follows && j < before.size())
-      inside &= std::abs(now - static_cast<double>(before[j])) <= largest_step_bar_;
+  bool inside = static_cast<double>(steps_.take(command_)) <= largest_step_bar_;
+  for (const float each : command_.pressure_bar) {
+    const auto bar = static_cast<double>(each);
+    inside &= std::isfinite(bar) && bar >= std::min(0.0, lowest_bar_) && bar <= highest_bar_;
   }
   if (!inside) ++outside_;
 }

@@ -13,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "command_steps.hpp"
 #include "softarm/config/experiment.hpp"
 #include "softarm/control/reference.hpp"
 #include "softarm/daemon/safety_monitor.hpp"
@@ -93,6 +94,7 @@ class SoakArm {
   softarm_messages::controller_status_t status_{}, decoded_{};
   softarm_messages::plant_state_t plant_{};
   softarm_messages::pressure_command_t command_{};
+  CommandSteps steps_;
   softarm_messages::curvature_reference_t reference_message_{};
 };
 

@@ -36,6 +36,7 @@ struct TickInput {
   bool disarm = false;
   bool emergency_stop = false;
   bool shutdown = false;         ///< from now on: vent, and nothing else
+  bool command_expired = false;  ///< so long ago was one sent that the valves have vented meanwhile
   int consecutive_overruns = 0;  ///< ticks missed in a row; zero where they are not to be judged
   /// Arrival of the newest pressure measurement, where the valves publish them.
   std::int64_t newest_measurement_ns = SafetyInput::kNever;
@@ -85,7 +86,7 @@ class ControlPipeline {
   std::int64_t period_ns() const noexcept { return period_ns_; }
 
  private:
-  void forget_expired_command(std::int64_t now_ns) noexcept;
+  void forget_command() noexcept;
   void validate_and_estimate(const TickInput& input, SafetyInput& safety) noexcept;
   void watch(const TickInput& input, SafetyInput& safety) noexcept;
   void use_frame(const MocapFrame& frame) noexcept;
@@ -103,7 +104,6 @@ class ControlPipeline {
   PipelineSettings settings_;
   std::int64_t period_ns_;
   double period_s_;
-  std::int64_t validity_ns_;
   FrameValidator validator_;
   CurvatureFilter filter_;
   SafetyMonitor safety_;

@@ -39,7 +39,9 @@ class DaemonLink {
   /// next call.
   TickInput collect(std::int64_t now_ns) noexcept;
 
-  /// Pressures, or torques where these actuate: another type, which no valve terminal decodes.
+  /// Pressures, or torques where these actuate: another type, which no valve terminal decodes. What
+  /// was decided before the command before it expired, and comes after that, is not sent: it would
+  /// be a step up from vented valves. The next tick hears of it (TickInput::command_expired).
   void publish_command(std::int64_t now_ns, const TickOutput& output) noexcept;
   void publish_status(std::int64_t now_ns, const ControlPipeline& pipeline,
                       const LoopTiming& timing) noexcept;
@@ -51,7 +53,7 @@ class DaemonLink {
   /// when no tick follows.
   bool repeat_record() noexcept;
 
-  /// Messages refused before decoding, and publications that failed.
+  /// Messages refused before decoding; publications that failed, and commands that came too late.
   std::int64_t malformed() const noexcept { return malformed_; }
   std::int64_t unsent() const noexcept { return unsent_; }
 
@@ -62,6 +64,7 @@ class DaemonLink {
   void take_measurement(const ReceivedMessage& packet) noexcept;
   void take_go(const ReceivedMessage& packet) noexcept;
   std::int64_t arrival_ns(const ReceivedMessage& packet) const noexcept;
+  bool command_expired(std::int64_t now_us) const noexcept;
 
   DaemonSettings settings_;
   MocapSource mocap_;
@@ -87,6 +90,7 @@ class DaemonLink {
   std::int64_t reference_sequence_;
   std::int64_t operator_sequence_;
   std::int64_t commands_ = 0;
+  std::int64_t sent_us_ = 0;  ///< the newest command, as it says itself
   std::int64_t malformed_ = 0;
   std::int64_t unsent_ = 0;
 

@@ -15,6 +15,7 @@
 #include <utility>
 #include <vector>
 
+#include "command_steps.hpp"
 #include "integration/processes/process.hpp"
 #include "softarm/daemon/realtime.hpp"
 #include "softarm/daemon/safety_monitor.hpp"
@@ -56,20 +57,13 @@ class Station {
       if (decode(packet.bytes, plant_)) ++plant_states_;
     });
     node_->subscribe("SOFTARM_PRESSURE_COMMAND", 4096, [this](const ReceivedMessage& packet) {
-      std::vector<float> before = command_.pressure_bar;
-      const std::int64_t sequence = command_.sequence, sent_us = command_.time_us;
       if (!decode(packet.bytes, command_)) return;
-      // The valves vent when a command expires: what comes after that is a step from zero.
-      if (command_.time_us - sent_us >= command_.validity_us)
-        std::fill(before.begin(), before.end(), 0.0F);
       ++commands_;
-      for (std::size_t j = 0; j < command_.pressure_bar.size(); ++j) {
-        const float now = command_.pressure_bar[j];
-        if (!std::isfinite(now)) all_finite_ = false;
-        lowest_ = std::min(lowest_, now);
-        highest_ = std::max(highest_, now);
-        if (command_.sequence == sequence + 1 && before.size() == command_.pressure_bar.size())
-          largest_step_ = std::max(largest_step_, std::abs(now - before[j]));
+      largest_step_ = std::max(largest_step_, steps_.take(command_));
+      for (const float bar : command_.pressure_bar) {
+        if (!std::isfinite(bar)) all_finite_ = false;
+        lowest_ = std::min(lowest_, bar);
+        highest_ = std::max(highest_, bar);
       }
     });
   }
@@ -130,6 +124,7 @@ class Station {
   softarm_messages::controller_status_t status_{};
   softarm_messages::plant_state_t plant_{};
   softarm_messages::pressure_command_t command_{};
+  CommandSteps steps_;
   int statuses_ = 0, plant_states_ = 0, commands_ = 0, started_ = 0;
   int active_in_row_ = 0;                   ///< statuses up to the newest
   std::set<std::pair<Mode, Reason>> seen_;  ///< since `forget`

@@ -99,6 +99,7 @@ inline RecordedRun record_run(const Experiment& experiment, double seconds, bool
     input.disarm = k == ticks * 8 / 10;
     input.arm = k % 40 == 0;
     input.shutdown = part > 0.95;
+    input.command_expired = k == ticks * 6 / 10;
     input.consecutive_overruns = k % 17 == 0 ? 1 : 0;
     const TickOutput& output = pipeline.tick(input);
     messages.set_command(k, output);

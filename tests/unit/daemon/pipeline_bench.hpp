@@ -24,7 +24,10 @@ inline Experiment paper_arm() {
 class PipelineBench {
  public:
   explicit PipelineBench(const Experiment& experiment)
-      : arm(experiment.arm), pipeline(experiment), u(SegmentVector::Zero(arm.dof())) {}
+      : arm(experiment.arm),
+        pipeline(experiment),
+        u(SegmentVector::Zero(arm.dof())),
+        validity_ns(std::llround(1e9 * experiment.daemon.lcm.command_validity_s)) {}
 
   /// One period: the arm moves, motion capture looks, the pipeline acts.
   const TickOutput& tick() {
@@ -32,6 +35,7 @@ class PipelineBench {
     move();
     if (now_ns >= next_capture_ns) capture();
     deliver();
+    input.command_expired = now_ns - input.now_ns >= validity_ns;
     input.now_ns = now_ns;
     input.frames = {arrived.data(), count};
     if (valves_publish) publish_pressures();
@@ -74,6 +78,7 @@ class PipelineBench {
   const ArmParameters arm;
   ControlPipeline pipeline;
   SegmentVector u;
+  std::int64_t validity_ns;
   std::int64_t now_ns = 1'000'000'000;
   std::int64_t next_capture_ns = now_ns;
   std::int64_t next_number = 1;

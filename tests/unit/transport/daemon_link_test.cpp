@@ -10,6 +10,7 @@
 
 #include "counted_malloc.hpp"
 #include "softarm/daemon/realtime.hpp"
+#include "softarm/transport/message_decoding.hpp"
 #include "unit/transport/messages.hpp"
 
 namespace softarm {
@@ -126,6 +127,38 @@ TEST_F(DaemonLinkOverUdp, TenThousandTicksAllocateNothing) {
   EXPECT_GT(active, 0);
   EXPECT_GT(link->malformed(), 0);
   EXPECT_EQ(link->unsent(), 0);
+}
+
+// A tick that is held up between its frames and its command decides for valves that were not
+// vented.
+TEST_F(DaemonLinkOverUdp, WhatWasDecidedBeforeTheValvesVentedIsNotSentAfterIt) {
+  pressure_command_t heard{};
+  int count = 0;
+  sender->subscribe(settings.daemon.lcm.command_channel, 100, [&](const ReceivedMessage& packet) {
+    if (decode(packet.bytes, heard)) ++count;
+  });
+  TickOutput output;
+  output.pressure_bar = PressureVector::Constant(12, 0.5);
+  std::int64_t now_ns = monotonic_now_ns();
+  const auto validity_ns = std::llround(1e9 * settings.daemon.lcm.command_validity_s);
+  const auto arrives = [&](int wanted) {
+    for (int k = 0; count < wanted && k < 100; ++k)
+      sender->wait_until(monotonic_now_ns() + 10'000'000);
+    return count == wanted;
+  };
+
+  EXPECT_TRUE(link->collect(now_ns).command_expired) << "none was sent";
+  link->publish_command(now_ns, output);
+  ASSERT_TRUE(arrives(1));
+  EXPECT_FALSE(link->collect(now_ns + validity_ns - 1000).command_expired);
+  link->publish_command(now_ns += validity_ns, output);
+  EXPECT_EQ(link->unsent(), 1);
+  EXPECT_TRUE(link->collect(now_ns).command_expired) << "not until something was sent";
+  link->publish_command(now_ns, output);
+  ASSERT_TRUE(arrives(2));
+  EXPECT_EQ(heard.sequence, 3);
+  EXPECT_FALSE(link->collect(now_ns + 1000).command_expired);
+  EXPECT_EQ(link->unsent(), 1);
 }
 
 TEST_F(DaemonLinkOverUdp, AFloodIsBoundedWork) {

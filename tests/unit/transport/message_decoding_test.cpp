@@ -41,8 +41,8 @@ std::vector<LengthField> length_fields(const tick_record_t& record) {
   const auto lists = static_cast<std::size_t>(record.num_chambers + 3 * record.dimension);
   const auto bodies = static_cast<std::size_t>(record.frames.at(0).num_bodies);
   const auto measured = static_cast<std::size_t>(record.num_measured);
-  const std::size_t frame = 73 + 8 * lists + 4 * measured;
-  return {{65, 2}, {67, 2}, {69, 2}, {71, 2}, {frame + 16, 2}, {frame + 18 + 61 * bodies, 4}};
+  const std::size_t frame = 74 + 8 * lists + 4 * measured;
+  return {{66, 2}, {68, 2}, {70, 2}, {72, 2}, {frame + 16, 2}, {frame + 18 + 61 * bodies, 4}};
 }
 std::vector<LengthField> length_fields(const controller_status_t& status) {
   const std::size_t counts = 48 + 4 + status.version.size() + 1 + 4 + 4 + 24;
