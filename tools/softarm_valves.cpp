@@ -192,6 +192,8 @@ class ValveLoop {
         break;
       }
       case ValveAction::exchange:
+        // Held up since it was decided, it may come to a terminal that has vented by itself.
+        guard_.wake(monotonic_now_ns());
         exchange(now_ns);
         break;
     }

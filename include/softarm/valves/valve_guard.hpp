@@ -72,14 +72,15 @@ struct ValveCounters {
 };
 
 /// Time is an argument (ns of a monotonic clock that never goes back). Once a cycle: `wake`, the
-/// commands that came, `next`, and what came of the action. Never throws or allocates after
-/// construction.
+/// commands that came, `next`, `wake` once more before an exchange, and what came of the action.
+/// Never throws or allocates after construction.
 class ValveGuard {
  public:
   explicit ValveGuard(const ValveGuardSettings& settings);
 
-  /// At the start of a cycle. False after a gap in time: everything that waits in queues is too old
-  /// and must be thrown away.
+  /// At the start of a cycle, and right before pressures are written: what was decided before a gap
+  /// in time is not for a terminal that may have vented meanwhile. False after a gap: everything
+  /// that waits in queues is too old and must be thrown away.
   bool wake(std::int64_t now_ns) noexcept;
 
   /// By the rules of CommandExpiry.

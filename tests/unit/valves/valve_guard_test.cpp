@@ -286,6 +286,15 @@ TEST_F(Guard, AGapInTimeIsADoubt) {
   EXPECT_TRUE(reach(ValveState::running));
 }
 
+TEST_F(Guard, WhatWasDecidedBeforeAGapIsNotWrittenAfterIt) {
+  run();
+  ASSERT_EQ(guard->next(now), ValveAction::exchange);
+  ASSERT_GT(guard->set_points_bar().minCoeff(), 0.0);
+  guard->wake(now += 300 * kMs);
+  EXPECT_TRUE(guard->set_points_bar().isZero());
+  EXPECT_EQ(guard->reason(), ValveReason::time_gap);
+}
+
 TEST_F(Guard, WithExplicitArmingCommandsMustHaveBeenZeroAfterADoubt) {
   settings.wait_for_zero = true;
   make();
