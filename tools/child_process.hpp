@@ -22,7 +22,7 @@ class ChildProcess {
  public:
   /// Starts `program`: a path, or a name that PATH knows. What it prints goes to the file `output`.
   /// A program that cannot be started ends with exit code 127. It is killed when this object, or
-  /// the thread that made it, ends.
+  /// the thread that made it, ends; a terminal's Ctrl-C does not reach it.
   ChildProcess(const std::string& program, const std::vector<std::string>& arguments,
                std::string output)
       : output_(std::move(output)) {
@@ -33,6 +33,7 @@ class ChildProcess {
     pid_ = fork();
     if (pid_ != 0) return;
     prctl(PR_SET_PDEATHSIG, SIGKILL);
+    setpgid(0, 0);
     const int file = open(output_.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0644);
     dup2(file, STDOUT_FILENO);
     dup2(file, STDERR_FILENO);

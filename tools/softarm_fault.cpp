@@ -98,10 +98,8 @@ void send_malformed(const Experiment& experiment, long packets) {
 
 int pause_process(const Options& options) {
   const auto send = [&](int number) {
-    if (options.pid > 1 && kill(options.pid, number) == 0) return true;
-    print_error("softarm-fault",
-                options.pid > 1 ? fmt::format("process {}: {}", options.pid, std::strerror(errno))
-                                : "pause needs --pid PID: pidof softarmd tells it");
+    if (kill(options.pid, number) == 0) return true;
+    print_error("softarm-fault", fmt::format("process {}: {}", options.pid, std::strerror(errno)));
     return false;
   };
   if (!send(SIGSTOP)) return kExitFailure;
@@ -211,6 +209,10 @@ int main(int argc, char** argv) {
     }
     if (options.config.empty() || options.fault.empty()) {
       softarm::print_error("softarm-fault", "CONFIG and FAULT are required; see --help and --list");
+      return softarm::kExitUsage;
+    }
+    if (options.fault == "pause" && options.pid <= 1) {
+      softarm::print_error("softarm-fault", "pause needs --pid PID: pidof softarmd tells it");
       return softarm::kExitUsage;
     }
     return softarm::make(options);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -58,12 +59,14 @@ class TerminalLink {
     const int address = settings_.registers.timeout_address;
     LinkResult result = terminal_.write(address, std::span(wanted).first(count));
     if (result == LinkResult::ok) result = terminal_.read(address, std::span(found).first(count));
-    found_timeout_s_ = timeout_s_of(settings_.registers, found);
+    found_timeout_s_.reset();
+    if (result == LinkResult::ok) found_timeout_s_ = timeout_s_of(settings_.registers, found);
     return {result, result == LinkResult::ok &&
                         std::equal(found.begin(), found.begin() + settings_.registers.timeout_words,
                                    wanted.begin())};
   }
-  double found_timeout_s() const { return found_timeout_s_; }
+  /// What `secure` read back; it could not where there is none.
+  std::optional<double> found_timeout_s() const { return found_timeout_s_; }
 
   LinkResult write(const Eigen::VectorXd& set_points_bar) noexcept {
     put_set_points(settings_.registers, settings_.order, set_points_bar, max_pressure_bar_, out_);
@@ -85,7 +88,7 @@ class TerminalLink {
   ModbusTerminal terminal_;
   ReadBack read_back_;
   std::vector<std::uint16_t> out_, in_;
-  double found_timeout_s_ = 0.0;
+  std::optional<double> found_timeout_s_;
 };
 
 class ValveLoop {
@@ -257,12 +260,18 @@ class ValveLoop {
     const char* opening = reason == ValveReason::none ? "" : " (";
     const char* closing = reason == ValveReason::none ? "" : ")";
     if (reason == ValveReason::failsafe_refused) {
-      log_.add(
-          "{:.3f} s: {} (fail-safe time-out refused: set {} s at register {}, read back {} s, {}); "
+      constexpr const char* kCure =
           "no pressure is written. Set valves.failsafe_timeout_s to what the terminal takes, or "
-          "valves.registers.timeout_address",
-          t_s, name(guard_.state()), settings_.failsafe_timeout_s,
-          settings_.registers.timeout_address, link_.found_timeout_s(), link_.terminal().error());
+          "valves.registers.timeout_address";
+      const double set_s = settings_.failsafe_timeout_s;
+      const int address = settings_.registers.timeout_address;
+      if (const auto found_s = link_.found_timeout_s()) {
+        log_.add("{:.3f} s: {} ({}: set {} s at register {}, read back {} s); {}", t_s,
+                 name(guard_.state()), name(reason), set_s, address, *found_s, kCure);
+      } else {
+        log_.add("{:.3f} s: {} ({}: {} s at register {}: {}); {}", t_s, name(guard_.state()),
+                 name(reason), set_s, address, link_.terminal().error(), kCure);
+      }
     } else if (guard_.chamber() >= 0) {
       const auto at = static_cast<std::size_t>(guard_.chamber());
       log_.add("{:.3f} s: {}{}{}{}: chamber {} (valve {}) set to {:.3f} bar reads {:.3f} bar", t_s,

@@ -40,7 +40,8 @@ bool ModbusTerminal::connect() noexcept {
   close();
   set_response_timeout(connect_timeout_s_);
   open_ = modbus_connect(context_) == 0;
-  if (!open_) error_ = errno;
+  // What libmodbus leaves where no answer came in time.
+  if (!open_) error_ = errno == EINPROGRESS ? ETIMEDOUT : errno;
   set_response_timeout(response_timeout_s_);
   return open_;
 }

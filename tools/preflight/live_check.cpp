@@ -83,7 +83,10 @@ int check_live(const Experiment& experiment, const LiveCheckOptions& options) {
   ArmListener listener(experiment, node, true);
   Progress progress(!options.json);
   listen(node, listener, options.listen_s, progress);
-  if (stop_requested != 0) return kExitFailure;
+  if (stop_requested != 0) {
+    print_error("softarm", "interrupted while listening: nothing was commanded or judged");
+    return kExitFailure;
+  }
   if (commander) return pulse(experiment, options, node, listener, *commander, progress);
   return print(preflight(experiment, listener.seen()), options.json);
 }

@@ -127,7 +127,10 @@ int request(const std::string& config, const Kind& kind) {
     const std::int64_t pause_end_ns = now_ns + 50'000'000;
     while (monotonic_now_ns() < pause_end_ns) node.wait_until(pause_end_ns);
     if (heard && kind.understood(status)) {
-      fmt::print("{}: {}\n", kind.done, state_text(status));
+      const bool waits =
+          kind.request == Request::ARM && static_cast<Mode>(status.mode) != Mode::active;
+      fmt::print("{}: {}{}\n", kind.done, state_text(status),
+                 waits ? "; the arm moves once every segment has been seen for a while" : "");
       return kExitOk;
     }
   }
