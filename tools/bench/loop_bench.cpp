@@ -9,6 +9,7 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <limits>
 #include <map>
 #include <memory>
 #include <random>
@@ -45,6 +46,18 @@ Durations durations(const std::vector<double>& samples_us) {
           .p50_us = quantile(samples_us, 0.5),
           .p99_us = quantile(samples_us, 0.99),
           .largest_us = quantile(samples_us, 1.0)};
+}
+
+/// Processor time since start that a virtual machine's host gave to others, of all processors; NaN
+/// where the kernel does not tell.
+double stolen_s() {
+  std::ifstream file("/proc/stat");
+  std::string name;
+  double user, nice, system, idle, io, interrupts, soft_interrupts, steal;
+  if (!(file >> name >> user >> nice >> system >> idle >> io >> interrupts >> soft_interrupts >>
+        steal))
+    return std::numeric_limits<double>::quiet_NaN();
+  return steal / static_cast<double>(sysconf(_SC_CLK_TCK));
 }
 
 /// Its own port and folder; the arm holds a set point.
@@ -98,6 +111,7 @@ class Scene {
   struct Window {
     std::size_t frame = 0, request = 0, bare = 0;
     std::int64_t tick = 0, missed = 0, bare_missed = 0;
+    double stolen_s = 0.0;
   };
   Window window(const SharedWakeUps& wake_ups) const;
   void evaluate(const Window& from, const Window& to, const SharedWakeUps& wake_ups);
@@ -211,7 +225,8 @@ Scene::Window Scene::window(const SharedWakeUps& wake_ups) const {
           .bare = wake_ups.count(),
           .tick = status_.tick,
           .missed = status_.overruns,
-          .bare_missed = wake_ups.missed()};
+          .bare_missed = wake_ups.missed(),
+          .stolen_s = stolen_s()};
 }
 
 /// The daemon's first tick is due before it is asked for, so its time is that of the first
@@ -228,8 +243,10 @@ void Scene::evaluate_ticks(const Window& from, const Window& to) {
     const auto& [number, tick] = *each;
     if (!tick.complete()) continue;
     const std::int64_t deadline_ns = due_ns(number, tick) + earliest_ns;
-    if (number <= to.tick)
-      lateness_us.push_back(1e-3 * static_cast<double>(tick.woken_ns - deadline_ns));
+    const std::int64_t lateness_ns = tick.woken_ns - deadline_ns;
+    if (number <= to.tick) lateness_us.push_back(1e-3 * static_cast<double>(lateness_ns));
+    // What the newest tick missed, its own status cannot tell yet.
+    if (number < to.tick) result_.missed_asleep += lateness_ns / period_ns_;
     const auto commanded = commanded_ns_.find(number);
     for (const auto& [frame, arrival_ns] : tick.frames) {
       const auto index = static_cast<std::size_t>(frame);
@@ -260,6 +277,7 @@ void Scene::evaluate(const Window& from, const Window& to, const SharedWakeUps& 
   result_.bare_lateness = durations(bare_us);
   result_.missed = to.missed - from.missed;
   result_.bare_missed = to.bare_missed - from.bare_missed;
+  result_.stolen_s = to.stolen_s - from.stolen_s;
   result_.unanswered =
       static_cast<std::int64_t>(to.frame - from.frame + to.request - from.request) -
       result_.echo.count - result_.command.count;

@@ -35,6 +35,8 @@ void write(JsonWriter& json, const LoopScene& scene) {
     json.member("lateness_p99_ratio", scene.lateness_p99_ratio());
     json.member("bare_missed", scene.bare_missed);
     json.member("missed", scene.missed);
+    json.member("missed_asleep", scene.missed_asleep);
+    json.member("stolen_s", scene.stolen_s);
     json.member("unanswered", scene.unanswered);
   } else {
     json.member("skipped", scene.skipped);
@@ -61,10 +63,11 @@ std::string table(const LoopScene& scene, double period_ms) {
   text += row("lateness, softarmd's tick", scene.lateness);
   text += fmt::format(
       "  round trip over the echo's: p50 {:.2f} (aim 1.15), p99 {:.2f} (aim 1.3); lateness p99 "
-      "{:.2f} (aim 1.5)\n  missed periods of {:g} ms: bare {}, softarmd {}; without an answer: "
-      "{}\n",
+      "{:.2f} (aim 1.5)\n  missed periods of {:g} ms: bare {}, softarmd {} ({} before it woke); "
+      "without an answer: {}; stolen by the host: {:.1f} s\n",
       scene.round_trip_p50_ratio(), scene.round_trip_p99_ratio(), scene.lateness_p99_ratio(),
-      period_ms, scene.bare_missed, scene.missed, scene.unanswered);
+      period_ms, scene.bare_missed, scene.missed, scene.missed_asleep, scene.unanswered,
+      scene.stolen_s);
   return text;
 }
 

@@ -45,6 +45,9 @@ TEST(BenchLoop, MeasuresTheDaemonBesideItsRivals) {
     EXPECT_GT(scene["lateness_p99_ratio"].as<double>(), 0.0);
     EXPECT_GE(scene["missed"].as<int>(), 0);
     EXPECT_GE(scene["bare_missed"].as<int>(), 0);
+    EXPECT_GE(scene["missed_asleep"].as<int>(), 0);
+    EXPECT_LE(scene["missed_asleep"].as<int>(), scene["missed"].as<int>());
+    EXPECT_FALSE(scene["stolen_s"].as<double>() < 0.0);
   }
 }
 
