@@ -254,6 +254,12 @@ class Checks {
     check_body_channels(seen);
     require(lcm.url.find("://") != std::string::npos, "daemon.lcm.url",
             "an LCM provider, such as udpm://239.255.76.67:7667?ttl=0", "\"" + lcm.url + "\"");
+    // LCM takes a group without a port for port 0, where nobody hears another.
+    const std::string network = lcm.url.substr(0, lcm.url.find('?'));
+    require(!network.starts_with("udpm://") || network == "udpm://" ||
+                network.find(':', 7) != std::string::npos,
+            "daemon.lcm.url", "a port behind the group, such as udpm://239.255.76.67:7667?ttl=0",
+            "\"" + lcm.url + "\"");
   }
 
   void check_valves() const {

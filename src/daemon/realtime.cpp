@@ -1,5 +1,6 @@
 #include "softarm/daemon/realtime.hpp"
 
+#include <arpa/inet.h>
 #include <pthread.h>
 #include <sched.h>
 #include <sys/mman.h>
@@ -10,10 +11,13 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cstddef>
+#include <cstdlib>
 #include <cstring>
 #include <stdexcept>
+#include <string_view>
 
 namespace softarm {
 namespace {
@@ -80,7 +84,22 @@ bool runs_under_fifo() noexcept {
 }
 
 std::string lock_name(const std::string& channel, const std::string& url) {
-  return channel + " on " + url.substr(0, url.find('?'));
+  constexpr std::string_view kUdp = "udpm://";
+  std::string network = url.substr(0, url.find('?'));
+  if (network.starts_with(kUdp)) {
+    // As LCM 1.3.1 reads it.
+    std::string text = network.substr(kUdp.size());
+    if (text.empty()) text = "239.255.76.67:7667";
+    const std::size_t colon = text.find(':');
+    in_addr address{};
+    if (inet_aton(text.substr(0, colon).c_str(), &address) == 1) {
+      std::array<char, INET_ADDRSTRLEN> digits{};
+      inet_ntop(AF_INET, &address, digits.data(), digits.size());
+      const long port = colon < text.size() ? std::strtol(text.c_str() + colon + 1, nullptr, 0) : 0;
+      network = std::string(kUdp) + digits.data() + ":" + std::to_string(port);
+    }
+  }
+  return channel + " on " + network;
 }
 
 InstanceLock::InstanceLock(const std::string& name) {

@@ -54,8 +54,8 @@ class OtherInstance : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// What instances on an LCM channel lock. The options behind the '?' of a URL make no other
-/// network.
+/// What instances on an LCM channel lock: neither the options behind the '?' of a URL nor another
+/// spelling of group and port make another network.
 std::string lock_name(const std::string& channel, const std::string& url);
 
 /// Held for the life of the process: keeps a second instance away from the same name. No file is

@@ -110,6 +110,7 @@ const Spoilt kSpoilt[] = {
     {"{stiffness_factor: 1.05}", "{stiffness_factor: 0}", "plant.mismatch.stiffness_factor",
      "(0, 100]"},
     {"status_channel: STATUS", "status_channel: \"\"", "daemon.lcm.status_channel", "printable"},
+    {"status_channel: STATUS", "url: \"udpm://239.255.76.67?ttl=0\"", "daemon.lcm.url", "a port"},
     // inconsistent
     {"  max_pressure_bar: 2", "  max_pressure_bar: 2\n  bias_pressure_bar: 3",
      "actuation.bias_pressure_bar", "between min and max", "bias_pressure_bar: 3"},
