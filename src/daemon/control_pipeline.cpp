@@ -48,6 +48,7 @@ const TickOutput& ControlPipeline::tick(const TickInput& input) noexcept {
   const std::int64_t act_ns = input.now_ns + period_ns_ / 2;
   predict(act_ns);
   safety.motion_unknown = !output_.motion.all_valid();
+  safety.command_expired = input.command_expired && ticked_;
   watch(input, safety);
 
   const Mode before = safety_.mode();

@@ -7,8 +7,9 @@
 namespace softarm {
 namespace {
 
-/// So long after a stop of the daemon what arrives may have been sent before it.
-constexpr std::int64_t kStaleRequests_ns = 500'000'000;
+/// So long after a stop of the daemon what arrives may have been sent before its end: it queues in
+/// the kernel, and is stamped as it leaves that.
+constexpr std::int64_t kStale_ns = 500'000'000;
 
 /// Everything a cause may look at.
 struct Evidence {
@@ -63,6 +64,8 @@ constexpr std::array kCauses{
           [](const Evidence& e) { return e.input.pressure_mismatch; }},
     Cause{{Reason::time_gap, Mode::vent, Clearance::good_frames},
           [](const Evidence& e) { return e.tick_gap_ns > e.thresholds.vent_after_ns; }},
+    Cause{{Reason::command_expired, Mode::vent, Clearance::good_frames},
+          [](const Evidence& e) { return e.input.command_expired; }},
     Cause{{Reason::sender_restarted, Mode::vent, Clearance::good_frames},
           [](const Evidence& e) { return e.input.sender_restarted; }},
     Cause{{Reason::frames_stale, Mode::vent, Clearance::good_frames},
@@ -134,7 +137,8 @@ const char* name(Reason reason) noexcept {
                               "emergency_stop",
                               "deadman_released",
                               "pressure_mismatch",
-                              "curvature_mismatch"};
+                              "curvature_mismatch",
+                              "command_expired"};
   static_assert(kNames.size() == static_cast<std::size_t>(kReasons));
   return name_of(reason, kNames);
 }
@@ -168,7 +172,8 @@ SafetyMonitor::SafetyMonitor(const SafetySettings& settings, double control_peri
 void SafetyMonitor::note_stop(const SafetyInput& input) noexcept {
   if (mode_ == Mode::init) return;
   const std::int64_t stopped_ns = input.now_ns - previous_tick_ns_;
-  if (stopped_ns > thresholds_.vent_after_ns) deaf_until_ns_ = input.now_ns + kStaleRequests_ns;
+  if (stopped_ns > thresholds_.vent_after_ns || input.command_expired)
+    deaf_until_ns_ = input.now_ns + kStale_ns;
   if (stopped_ns > thresholds_.valve_silence_ns &&
       input.newest_measurement_ns > listening_since_ns_)
     listening_since_ns_ = input.now_ns;
@@ -235,11 +240,12 @@ Mode SafetyMonitor::step(const SafetyInput& input) noexcept {
   }
 
   // A run of good frames is one without a cause, a rejection, a gap or silent valves, and begins
-  // anew with the arm vented: until then it is moving.
+  // anew with the arm vented (until then it is moving), and when what queued up is through.
   const bool still_venting = mode_ >= Mode::vent && !input.fully_vented;
   const bool unheard = settings_.valve_readback && listening_since_ns_ != SafetyInput::kNever &&
                        input.newest_measurement_ns <= listening_since_ns_;
-  if (worst.demands > Mode::active || input.bad_frames > 0 || still_venting || unheard) {
+  const bool deaf = input.now_ns < deaf_until_ns_;
+  if (worst.demands > Mode::active || input.bad_frames > 0 || still_venting || unheard || deaf) {
     good_in_a_row_ = 0;
   } else {
     good_in_a_row_ = std::min(good_in_a_row_ + input.good_frames, settings_.good_frames);

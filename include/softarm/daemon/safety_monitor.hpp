@@ -41,9 +41,10 @@ enum class Reason : std::int8_t {
   emergency_stop,
   deadman_released,
   pressure_mismatch,
-  curvature_mismatch
+  curvature_mismatch,
+  command_expired
 };
-inline constexpr int kReasons = static_cast<int>(Reason::curvature_mismatch) + 1;
+inline constexpr int kReasons = static_cast<int>(Reason::command_expired) + 1;
 
 /// As above, in static storage; "unknown" for a value outside the enumeration.
 const char* name(Mode mode) noexcept;
@@ -94,6 +95,7 @@ struct SafetyInput {
   std::int64_t newest_measurement_ns = kNever;  ///< of the valves' read-back
   bool pressure_mismatch = false;               ///< measured pressures do not follow the commands
   bool curvature_mismatch = false;              ///< the arm is not where its pressures would put it
+  bool command_expired = false;                 ///< the valves have vented for want of a command
   bool deadman_used = false;                    ///< there is a dead-man input
   std::int64_t newest_go_ns = kNever;           ///< of that
   bool arm = false;
@@ -105,7 +107,9 @@ struct SafetyInput {
 /// Reads no clock, allocates nothing, throws nothing. Transitions follow the severity of the causes
 /// present: the most severe wins. Valves count as silent for as long as the monitor was stepped and
 /// did not hear them: what arrived while the daemon was stopped may have been dropped. After such a
-/// stop no frame is good before they have been heard again, and for half a second no `arm` counts.
+/// stop, or where commands did not reach the valves in time, no frame is good before they have been
+/// heard again, and for half a second neither frames nor an `arm` count: they may be older than
+/// they look.
 /// While nothing is pressurised (WAIT_FRAMES) a cause that demands HOLD or VENT only keeps the arm
 /// from becoming active; with explicit arming one that demands VENT takes the arming back.
 class SafetyMonitor {
@@ -134,7 +138,7 @@ class SafetyMonitor {
   int good_in_a_row_ = 0;
   std::int64_t previous_tick_ns_ = 0;
   std::int64_t listening_since_ns_ = SafetyInput::kNever;  ///< end of the last stop, for the valves
-  std::int64_t deaf_until_ns_ = SafetyInput::kNever;       ///< to `arm`, after a stop
+  std::int64_t deaf_until_ns_ = SafetyInput::kNever;       ///< to `arm` and frames, after a stop
 };
 
 }  // namespace softarm

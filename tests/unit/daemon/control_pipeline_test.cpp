@@ -211,6 +211,37 @@ TEST_F(Pipeline, AfterAStallPressuresRiseFromZeroWithinTheSlew) {
   }
 }
 
+// The valves have vented, shorter though it was than the gap that vents: who armed the arm has to
+// see that first.
+TEST_F(Pipeline, AfterAStallThatOutlivedACommandTheArmIsVentedAndDisarmed) {
+  Experiment explicitly = experiment;
+  explicitly.daemon.safety.arming = Arming::explicit_;
+  explicitly.daemon.safety.vent_after_s = 0.5;
+  PipelineBench bench(explicitly);
+  bench.run(200);
+  bench.input.arm = true;
+  ASSERT_GT(bench.run_to(Mode::active), 0);
+  bench.now_ns += 140 * kMs;
+  bench.next_capture_ns = bench.now_ns;
+  bench.tick();
+  EXPECT_EQ(bench.pipeline.output().mode, Mode::vent);
+  EXPECT_EQ(bench.pipeline.output().reason, Reason::command_expired);
+  EXPECT_EQ(bench.run_to(Mode::active), -1);
+  EXPECT_FALSE(bench.pipeline.output().armed);
+}
+
+TEST_F(Pipeline, FramesThatQueuedUpInAStopDoNotMakeItActive) {
+  PipelineBench bench(experiment);
+  bend(bench);
+  bench.now_ns += 600 * kMs;
+  bench.next_capture_ns = bench.now_ns;
+  bench.tick();
+  ASSERT_EQ(bench.pipeline.output().reason, Reason::time_gap);
+  bench.frame_period_ns = bench.latency_ns = 100'000;  // as they leave the kernel, stamped anew
+  EXPECT_EQ(bench.run_to(Mode::active, 240), -1);
+  EXPECT_GT(bench.run_to(Mode::active), 0);
+}
+
 TEST_F(Pipeline, ASoftLimitCountsInHoldWhileTheArmIsSeen) {
   PipelineBench bench(experiment);
   bend(bench);

@@ -35,7 +35,8 @@ class PipelineBench {
     move();
     if (now_ns >= next_capture_ns) capture();
     deliver();
-    input.command_expired = now_ns - input.now_ns >= validity_ns;
+    input.command_expired = now_ns - sent_ns >= validity_ns;
+    if (sends) sent_ns = now_ns;
     input.now_ns = now_ns;
     input.frames = {arrived.data(), count};
     if (valves_publish) publish_pressures();
@@ -91,6 +92,8 @@ class PipelineBench {
 
   bool valves_publish = true;  ///< pressures, 10 ms behind the commands
   bool going = true;           ///< somebody holds the dead-man switch
+  bool sends = true;           ///< commands reach the valves
+  std::int64_t sent_ns = 0;    ///< the newest that did
   /// Spoils what the valves measured.
   std::function<void(PressureVector&)> leak;
   /// Spoils a frame before it is sent; returns whether to send it.
@@ -153,16 +156,13 @@ class PipelineBench {
 class PressureLimits {
  public:
   explicit PressureLimits(const Experiment& experiment)
-      : settings_(experiment.actuation),
-        period_s_(1.0 / experiment.daemon.rate_hz),
-        validity_s_(experiment.daemon.lcm.command_validity_s) {}
+      : settings_(experiment.actuation), period_s_(1.0 / experiment.daemon.rate_hz) {}
 
-  /// Empty, or what is wrong; `gap_s` after the tick before.
-  const char* violation(const TickOutput& output, double gap_s = 0.0) {
+  /// Empty, or what is wrong; `expired`: the command before, so the valves have vented.
+  const char* violation(const TickOutput& output, bool expired = false) {
     const PressureVector& now = output.pressure_bar;
     const char* wrong = "";
-    // Held up for longer the valves have vented, and pressures rise from there.
-    if (before_.size() == 0 || gap_s >= validity_s_) before_ = PressureVector::Zero(now.size());
+    if (before_.size() == 0 || expired) before_ = PressureVector::Zero(now.size());
     const double rate =
         output.mode == Mode::active ? settings_.slew_bar_per_s : settings_.vent_bar_per_s;
     for (Eigen::Index j = 0; j < now.size(); ++j) {
@@ -180,7 +180,7 @@ class PressureLimits {
 
  private:
   ActuationSettings settings_;
-  double period_s_, validity_s_;
+  double period_s_;
   PressureVector before_;
 };
 

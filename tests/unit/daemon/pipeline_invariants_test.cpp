@@ -42,9 +42,9 @@ class Promises {
         oldest == SafetyInput::kNever || bench_.now_ns - oldest > thresholds_.vent_after_ns;
     const Mode mode = output.mode;
 
-    const double gap_s = 1e-9 * static_cast<double>(bench_.now_ns - previous_ns_);
-    previous_ns_ = bench_.now_ns;
-    std::string wrong = limits_.violation(output, gap_s);
+    const bool expired = bench_.input.command_expired;
+    std::string wrong = limits_.violation(output, expired);
+    if (mode == Mode::active && expired) wrong = "ACTIVE although the valves have vented";
     if (mode == Mode::active && !fresh) wrong = "ACTIVE without fresh frames of every segment";
     if (mode == Mode::active && !output.motion.all_valid())
       wrong = "ACTIVE with an unknown segment";
@@ -80,7 +80,6 @@ class Promises {
   std::array<std::int64_t, 3> newest_{};
   Mode before_ = Mode::init;
   bool vented_before_ = true;
-  std::int64_t previous_ns_ = 0;
   int venting_ = 0, vent_ticks_ = 0;
 };
 

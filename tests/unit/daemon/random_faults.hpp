@@ -30,6 +30,8 @@ class RandomFaults {
     if (!bench_.going && chance(0.02)) bench_.going = true;
     if (chance(0.001)) bench_.valves_publish = false;
     if (chance(0.02)) bench_.valves_publish = true;
+    if (chance(0.0005)) bench_.sends = false;
+    if (chance(0.01)) bench_.sends = true;
     if (chance(0.0005)) leaking_ = true;
     if (chance(0.002)) leaking_ = false;
     bench_.input.consecutive_overruns =
