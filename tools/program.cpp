@@ -93,12 +93,13 @@ CLI::Validator number_between(double low, double high) {
 }
 
 CLI::Validator positive_seconds() {
+  static constexpr double kLongest_s = 1e8;  // three years; their nanoseconds fit an int64
   const auto check = [](std::string& text) -> std::string {
     double seconds = 0.0;
     const bool number = CLI::detail::lexical_cast(text, seconds);
-    return number && std::isfinite(seconds) && seconds > 0.0
+    return number && seconds > 0.0 && seconds <= kLongest_s
                ? std::string()
-               : fmt::format("expected seconds above zero, got {}", text);
+               : fmt::format("expected seconds above 0 and up to {:g}, got {}", kLongest_s, text);
   };
   return {check, "SECONDS"};
 }

@@ -193,7 +193,7 @@ int main(int argc, char** argv) {
   app.add_option("--body", options.body, "which body, or chamber, in the order of the message")
       ->check(CLI::NonNegativeNumber);
   app.add_option("--after", options.after_s, "seconds until the fault begins")
-      ->check(CLI::NonNegativeNumber);
+      ->check(softarm::number_between(0.0, 1e8));
   app.add_option("--for", options.for_s, "seconds until it ends")
       ->check(softarm::positive_seconds());
   app.add_option("--sensor-suffix", options.suffix, "of the channels the sensors publish on");

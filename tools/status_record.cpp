@@ -85,7 +85,13 @@ bool StatusRecord::take(std::string_view channel, std::span<const std::byte> byt
 }
 
 bool StatusRecord::take_status(std::span<const std::byte> bytes) {
-  if (!decode(bytes, status_) || status_.num_segments != experiment_.arm.size()) return false;
+  if (!decode(bytes, decoded_) || decoded_.num_segments != experiment_.arm.size()) return false;
+  // A shadow may be watched alone; beside the daemon that moves the arm it is not what is asked
+  // for.
+  const bool shadow = (decoded_.flags & decoded_.SHADOW) != 0;
+  if (shadow && commander_heard_) return false;
+  commander_heard_ = !shadow;
+  std::swap(status_, decoded_);
   // The reference in a status belongs to the middle of the period that begins with its tick.
   const double period_s = 1.0 / experiment_.daemon.rate_hz;
   const std::int64_t time_us = status_.time_us + static_cast<std::int64_t>(0.5e6 * period_s);

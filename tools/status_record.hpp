@@ -76,7 +76,8 @@ class StatusRecord {
   std::optional<ExperimentLog> log_;
   TruthTrack truth_;
   std::deque<WaitingRow> waiting_;
-  softarm_messages::controller_status_t status_{};
+  softarm_messages::controller_status_t status_{}, decoded_{};
+  bool commander_heard_ = false;  ///< a daemon that is no shadow
   softarm_messages::plant_state_t plant_message_{};
   softarm_messages::timing_t timing_{};
   bool timing_received_ = false;

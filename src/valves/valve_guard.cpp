@@ -43,7 +43,8 @@ const char* name(ValveReason reason) noexcept {
 ValveGuard::ValveGuard(const ValveGuardSettings& settings)
     : settings_(settings),
       period_ns_(to_ns(1.0 / settings.driver.rate_hz)),
-      gap_ns_(std::max(5 * period_ns_, kShortestGap_ns)),
+      failsafe_ns_(to_ns(settings.driver.failsafe_timeout_s)),
+      gap_ns_(std::min(std::max(5 * period_ns_, kShortestGap_ns), failsafe_ns_)),
       first_backoff_ns_(to_ns(settings.driver.backoff_s)),
       longest_backoff_ns_(to_ns(settings.driver.longest_backoff_s)),
       stuck_after_ns_(to_ns(settings.driver.stuck_after_s)),
@@ -83,7 +84,9 @@ void ValveGuard::doubt(ValveReason reason, int chamber) noexcept {
 }
 
 bool ValveGuard::wake(std::int64_t now_ns) noexcept {
-  const bool gap = woken_ns_ != kLongAgo && now_ns - woken_ns_ > gap_ns_;
+  bool gap = woken_ns_ != kLongAgo && now_ns - woken_ns_ > gap_ns_;
+  // However the time went by since the terminal answered last, it has vented by itself.
+  gap |= state_ == ValveState::running && now_ns - answered_ns_ >= failsafe_ns_;
   woken_ns_ = now_ns;
   // Without a connection there is nothing to doubt, and connecting itself takes time.
   if (gap && (state_ == ValveState::running || state_ == ValveState::vented))
@@ -214,6 +217,7 @@ void ValveGuard::exchanged(LinkResult result, const ReadBack& read_back,
                            std::int64_t now_ns) noexcept {
   if (result != LinkResult::ok) return failed(result, now_ns);
   ++counters_.cycles;
+  answered_ns_ = now_ns;
   if (failures_ > 0) since_ns_ = now_ns;
   failures_ = 0;
   const bool zero = set_points_bar_.maxCoeff() <= 0.0;

@@ -16,15 +16,19 @@ class RawTerminal {
   RawTerminal() {
     if (tcgetattr(STDIN_FILENO, &before_) != 0)
       throw std::runtime_error("standard input is no terminal: keys cannot be held there");
-    termios raw = before_;
-    raw.c_lflag &= ~static_cast<tcflag_t>(ICANON | ECHO);
-    raw.c_cc[VMIN] = 0;
-    raw.c_cc[VTIME] = 0;
-    tcsetattr(STDIN_FILENO, TCSANOW, &raw);
+    raw_ = before_;
+    raw_.c_lflag &= ~static_cast<tcflag_t>(ICANON | ECHO);
+    raw_.c_cc[VMIN] = 0;
+    raw_.c_cc[VTIME] = 0;
+    tcsetattr(STDIN_FILENO, TCSANOW, &raw_);
   }
   ~RawTerminal() { tcsetattr(STDIN_FILENO, TCSANOW, &before_); }
   RawTerminal(const RawTerminal&) = delete;
   RawTerminal& operator=(const RawTerminal&) = delete;
+
+  /// Forgets the keys that wait. Raw again, too: a shell has its own ways with the terminal of a
+  /// program that was stopped.
+  void begin_anew() const { tcsetattr(STDIN_FILENO, TCSAFLUSH, &raw_); }
 
   /// What came since the last call: the newest key, 0 where none did, kGone where the terminal is
   /// gone.
@@ -41,7 +45,7 @@ class RawTerminal {
   }
 
  private:
-  termios before_{};
+  termios before_{}, raw_{};
 };
 
 }  // namespace softarm

@@ -114,6 +114,12 @@ int identify(Command& command) {
   command.choice.damping = !command.no_damping;
   command.choice.inertia = !command.no_inertia;
   if (command.coverage) return print_coverage(experiment, command);
+  // Told before the arm moves, not after.
+  if (const auto folder = std::filesystem::absolute(command.output).parent_path();
+      !command.output.empty() && !std::filesystem::is_directory(folder)) {
+    print_error("softarm", fmt::format("--output: there is no folder {}", folder.string()));
+    return kExitUsage;
+  }
 
   const MotionRecord record = record_of(experiment, command);
   const ParameterSet set(believed(experiment), experiment.actuation.kind, command.choice);
@@ -247,7 +253,8 @@ void add_identify_command(CLI::App& app) {
                     ->add_option("--seeds", options->study.seeds,
                                  "do it on so many arms drawn at random, and print how often the "
                                  "intervals hold the truth")
-                    ->check(CLI::Range(1, 100000));
+                    ->check(CLI::Range(1, 100000))
+                    ->excludes("--live");
   command
       ->add_option("--spread", options->study.spread,
                    "with --seeds: how far the truth is off the configured, at most")

@@ -89,8 +89,11 @@ class Jog {
   void follow_keys(const RawTerminal& terminal) {
     Progress progress(true);
     KeyHold hold;
+    std::int64_t before_ns = monotonic_now_ns();
     while (stop_requested == 0) {
       const std::int64_t now_ns = monotonic_now_ns();
+      // Keys that queued up while we were held up (Ctrl-Z, fg) are not being held.
+      if (now_ns - std::exchange(before_ns, now_ns) > KeyHold::kNext_ns) terminal.begin_anew();
       const int key = terminal.key();
       if (key == kQuit || key == RawTerminal::kGone) return;
       if (key != 0) hold.event(now_ns);

@@ -1,12 +1,13 @@
 // softarm arm, disarm, estop, deadman: what a person asks of a running daemon.
 #include <fmt/format.h>
-#include <yaml-cpp/yaml.h>
 
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
+#include <fstream>
 #include <functional>
 #include <memory>
+#include <regex>
 #include <softarm_messages/controller_status_t.hpp>
 #include <softarm_messages/deadman_t.hpp>
 #include <softarm_messages/operator_command_t.hpp>
@@ -29,6 +30,8 @@ using softarm_messages::controller_status_t;
 using Request = softarm_messages::operator_command_t;
 
 constexpr std::int64_t kPatience_ns = 2'000'000'000;
+constexpr const char* kUnsent =
+    "the message could not be sent: see tools/with_loopback_network --check";
 
 bool shadow(const controller_status_t& status) {
   return (status.flags & controller_status_t::SHADOW) != 0;
@@ -75,20 +78,23 @@ std::string state_text(const controller_status_t& status) {
                      name(static_cast<Reason>(status.reason)));
 }
 
-/// What can be read of daemon.lcm in a configuration that is wrong somewhere; the rest by default.
+/// What can be read of daemon.lcm in a configuration that is wrong somewhere, or no YAML at all;
+/// the rest by default. These keys stand nowhere else.
 void read_network(const std::filesystem::path& file, LcmSettings& lcm, int includes_left = 8) {
-  try {
-    const YAML::Node root = YAML::LoadFile(file.string());
-    if (root["include"] && includes_left > 0)
-      read_network(file.parent_path() / root["include"].as<std::string>(), lcm, includes_left - 1);
-    const YAML::Node network = root["daemon"]["lcm"];
-    const std::pair<const char*, std::string*> keys[] = {
-        {"url", &lcm.url},
-        {"operator_channel", &lcm.operator_channel},
-        {"status_channel", &lcm.status_channel}};
-    for (const auto& [key, value] : keys)
-      if (network[key]) *value = network[key].as<std::string>();
-  } catch (const YAML::Exception&) {  // what was read so far is all there is
+  static const std::regex kEntry(
+      R"((?:^|[\s{,])(include|url|operator_channel|status_channel):\s*["']?([^\s"',}]+))");
+  std::ifstream text(file);
+  for (std::string line; std::getline(text, line);) {
+    line = line.substr(0, line.find(" #"));
+    if (line.starts_with('#')) continue;
+    for (std::sregex_iterator entry(line.begin(), line.end(), kEntry), end; entry != end; ++entry) {
+      const std::string key = (*entry)[1], value = (*entry)[2];
+      if (key == "include" && includes_left > 0)
+        read_network(file.parent_path() / value, lcm, includes_left - 1);
+      if (key == "url") lcm.url = value;
+      if (key == "operator_channel") lcm.operator_channel = value;
+      if (key == "status_channel") lcm.status_channel = value;
+    }
   }
 }
 
@@ -96,13 +102,13 @@ void read_network(const std::filesystem::path& file, LcmSettings& lcm, int inclu
 LcmSettings network_of(const std::string& config, const Kind& kind) {
   try {
     return load_experiment(config).daemon.lcm;
-  } catch (const ConfigError& error) {
-    if (kind.request == Request::ARM || !std::filesystem::exists(config)) throw;
+  } catch (const std::exception& error) {
+    if (kind.request == Request::ARM || !std::filesystem::is_regular_file(config)) throw;
     print_error("softarm", error.what());
     LcmSettings lcm;
     read_network(config, lcm);
-    say(fmt::format("softarm: {} all the same, on {} of {}\n", kind.command, lcm.operator_channel,
-                    lcm.url));
+    say(fmt::format("softarm: {} all the same, on {} of {}, if that is your daemon's network\n",
+                    kind.command, lcm.operator_channel, lcm.url));
     return lcm;
   }
 }
@@ -123,7 +129,9 @@ int request(const std::string& config, const Kind& kind) {
   const std::int64_t start_ns = monotonic_now_ns();
   for (std::int64_t now_ns = start_ns; now_ns - start_ns < kPatience_ns;
        now_ns = monotonic_now_ns()) {
-    node.publish(lcm.operator_channel, Request{.sequence = date_ns(), .request = kind.request});
+    if (!node.publish(lcm.operator_channel,
+                      Request{.sequence = date_ns(), .request = kind.request}))
+      throw TransportError(kUnsent);
     const std::int64_t pause_end_ns = now_ns + 50'000'000;
     while (monotonic_now_ns() < pause_end_ns) node.wait_until(pause_end_ns);
     if (heard && kind.understood(status)) {
@@ -160,7 +168,9 @@ int hold_deadman(const std::string& config) {
              1e-9 * static_cast<double>(period_ns));
   std::fflush(stdout);
   while (stop_requested == 0) {
-    node.publish(lcm.deadman_channel, softarm_messages::deadman_t{.sequence = date_ns(), .go = 1});
+    if (!node.publish(lcm.deadman_channel,
+                      softarm_messages::deadman_t{.sequence = date_ns(), .go = 1}))
+      throw TransportError(kUnsent);
     sleep_until_ns(monotonic_now_ns() + period_ns);  // after a stop of ours nothing is made up for
   }
   node.publish(lcm.deadman_channel, softarm_messages::deadman_t{.sequence = date_ns(), .go = 0});

@@ -184,9 +184,12 @@ int replay(const ReplayOptions& options) {
   }
   if (summary.ticks == 0)
     print_error("softarm",
-                fmt::format("{} holds no record of a tick on channel {}: was lcm-logger started "
-                            "before the daemon, and is this the daemon's configuration?",
-                            options.log, experiment.daemon.lcm.tick_channel));
+                fmt::format("{} holds no record of a tick on channel {}: {}", options.log,
+                            experiment.daemon.lcm.tick_channel,
+                            summary.malformed > 0
+                                ? "what is there was malformed, or recorded by another version"
+                                : "was lcm-logger started before the daemon, and is this the "
+                                  "daemon's configuration?"));
   return exit_code(summary, log);
 }
 

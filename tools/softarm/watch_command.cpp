@@ -35,6 +35,7 @@ std::string progress_text(const StatusRecord& record, double duration_s) {
                                  name(static_cast<Mode>(status.mode)), 1e3 * status.frame_age_s);
   if (static_cast<Mode>(status.mode) != Mode::active)
     text += fmt::format(" ({})", name(static_cast<Reason>(status.reason)));
+  if ((status.flags & status.SHADOW) != 0) text += " shadow";
   if (duration_s > 0.0) text += fmt::format(" {:3.0f} %", 100.0 * record.active_s() / duration_s);
   const int shown = std::min<int>(status.num_segments, 4);
   for (std::size_t i = 0; i < static_cast<std::size_t>(shown); ++i)
@@ -184,6 +185,10 @@ int watch(const WatchOptions& options) {
       progress.update(progress_text(record, options.duration_s));
   }
   record.close();
+  if (record.rows() == 0) {
+    print_error("softarm", fmt::format("no status on {}", lcm.status_channel));
+    return kExitFailure;
+  }
   fmt::print("{}", record.table());
   return kExitOk;
 }

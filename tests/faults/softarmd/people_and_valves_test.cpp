@@ -62,7 +62,10 @@ TEST_P(PeopleAndValves, ArmDisarmEmergencyStopAndDeadMan) {
   EXPECT_EQ(ask("arm", &printed), 1);
   EXPECT_NE(printed.find("FAULT (emergency_stop); disarm first"), std::string::npos) << printed;
   EXPECT_EQ(mode(), Mode::fault) << told();
-  EXPECT_EQ(ask("disarm"), 0);
+  config_ = folder_ / "broken.yaml";  // no YAML any more
+  std::ofstream(config_) << "include: " << good << "\nname: [edited\n";
+  EXPECT_EQ(ask("disarm", &printed), 0) << printed;
+  config_ = good;
   ASSERT_TRUE(becomes(*this, Mode::vent, Reason::waiting_for_arm)) << told();
   EXPECT_EQ(ask("arm"), 0);
   ASSERT_TRUE(wait_for([&] { return under_pressure(); })) << daemon->printed();

@@ -286,6 +286,29 @@ TEST_F(Guard, AGapInTimeIsADoubt) {
   EXPECT_TRUE(reach(ValveState::running));
 }
 
+// What is a gap depends on the terminal: it may have vented already.
+TEST_F(Guard, NoGapIsLongerThanTheTerminalsOwnTimeOut) {
+  settings.driver.failsafe_timeout_s = 0.02;
+  make();
+  run();
+  now += 16 * kMs;
+  cycle();
+  EXPECT_EQ(guard->state(), ValveState::doubt);
+  EXPECT_TRUE(written.isZero());
+}
+
+TEST_F(Guard, WhereNoAnswerCameForTheTerminalsTimeOutItHasVented) {
+  settings.driver.tolerated_failures = 100;
+  settings.driver.failsafe_timeout_s = 0.2;
+  make();
+  run();
+  for (int k = 0; k < 39; ++k) cycle(LinkResult::no_answer);
+  ASSERT_EQ(guard->state(), ValveState::running);
+  cycle();
+  EXPECT_EQ(guard->state(), ValveState::doubt);
+  EXPECT_EQ(guard->reason(), ValveReason::time_gap);
+}
+
 TEST_F(Guard, WhatWasDecidedBeforeAGapIsNotWrittenAfterIt) {
   run();
   ASSERT_EQ(guard->next(now), ValveAction::exchange);
