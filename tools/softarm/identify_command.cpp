@@ -115,8 +115,8 @@ int identify(Command& command) {
   command.choice.inertia = !command.no_inertia;
   if (command.coverage) return print_coverage(experiment, command);
   // Told before the arm moves, not after.
-  if (const auto folder = std::filesystem::absolute(command.output).parent_path();
-      !command.output.empty() && !std::filesystem::is_directory(folder)) {
+  const auto folder = (std::filesystem::path(".") / command.output).parent_path();
+  if (!std::filesystem::is_directory(folder)) {
     print_error("softarm", fmt::format("--output: there is no folder {}", folder.string()));
     return kExitUsage;
   }
