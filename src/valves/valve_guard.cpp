@@ -50,7 +50,8 @@ ValveGuard::ValveGuard(const ValveGuardSettings& settings)
       stuck_after_ns_(to_ns(settings.driver.stuck_after_s)),
       good_cycles_needed_(std::max(
           kStartCycles, static_cast<int>(std::ceil(kGoodFor_s * settings.driver.rate_hz)))),
-      expiry_(settings.chambers, to_ns(settings.longest_validity_s)),
+      validity_ns_(to_ns(settings.longest_validity_s)),
+      expiry_(settings.chambers, validity_ns_),
       backoff_ns_(first_backoff_ns_),
       must_see_zero_(settings.wait_for_zero),
       set_points_bar_(Eigen::VectorXd::Zero(settings.chambers)),
@@ -66,8 +67,8 @@ void ValveGuard::enter(ValveState state, ValveReason reason) noexcept {
 }
 
 void ValveGuard::disconnect(ValveReason reason, std::int64_t now_ns) noexcept {
-  if (state_ == ValveState::running || state_ == ValveState::doubt)
-    must_see_zero_ |= settings_.wait_for_zero;
+  if (settings_.wait_for_zero && (state_ == ValveState::running || state_ == ValveState::doubt))
+    wait_for_zero();
   if (reason == ValveReason::failsafe_refused) backoff_ns_ = longest_backoff_ns_;
   next_attempt_ns_ = now_ns + backoff_ns_;
   backoff_ns_ = std::min(2 * backoff_ns_, longest_backoff_ns_);
@@ -76,7 +77,7 @@ void ValveGuard::disconnect(ValveReason reason, std::int64_t now_ns) noexcept {
 
 void ValveGuard::doubt(ValveReason reason, int chamber) noexcept {
   // A stuck valve would be found only by raising the pressure once more: someone has to look first.
-  must_see_zero_ |= settings_.wait_for_zero || reason == ValveReason::stuck_valve;
+  if (settings_.wait_for_zero || reason == ValveReason::stuck_valve) wait_for_zero();
   if (state_ != ValveState::doubt) ++counters_.doubts;
   good_cycles_ = 0;
   chamber_ = chamber;
@@ -102,15 +103,23 @@ ValveAction ValveGuard::next(std::int64_t now_ns) noexcept {
     case ValveState::securing:
       return ValveAction::secure;
     default:
-      update_running();
+      update_running(now_ns);
       update_set_points(now_ns);
       return ValveAction::exchange;
   }
 }
 
-void ValveGuard::update_running() noexcept {
+void ValveGuard::wait_for_zero() noexcept {
+  must_see_zero_ = true;
+  listening_since_ns_ = kLongAgo;
+}
+
+void ValveGuard::update_running(std::int64_t now_ns) noexcept {
   const bool commanded = !expiry_.vented();
-  if (!commanded || expiry_.set_points_bar().maxCoeff() <= 0.0) must_see_zero_ = false;
+  if (listening_since_ns_ == kLongAgo) listening_since_ns_ = now_ns;
+  // What we could not hear is no silence of the controller.
+  const bool silent = !commanded && now_ns - listening_since_ns_ >= validity_ns_;
+  if (silent || (commanded && expiry_.set_points_bar().maxCoeff() <= 0.0)) must_see_zero_ = false;
   if (state_ != ValveState::vented && state_ != ValveState::running) return;
   if (stopping_) {
     enter(ValveState::vented, ValveReason::shutdown);

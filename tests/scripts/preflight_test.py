@@ -45,7 +45,7 @@ class Arm:
         """An experiment on this arm's port; `more` stands in place of the arm's own keys."""
         path = self.folder / f"{name}.yaml"
         path.write_text(f"include: {ROOT}/config/{self.base}\nname: {name}\n{self.more if more is None else more}"
-                        f"daemon:\n  lcm: {{url: \"{self.url}\"}}\n  safety: {{{SAFETY}}}\n{daemon}", encoding="utf-8")
+                        f"daemon:\n  lcm: {{url: \"{self.url}\", command_validity_s: 0.3}}\n  safety: {{{SAFETY}}}\n{daemon}", encoding="utf-8")
         return path
 
     def start(self, said, program, *arguments):

@@ -36,9 +36,9 @@ def own_url():
 
 
 def write_config(folder, base, url, more=""):
-    """An experiment like config/BASE on LCM at `url`; `more` is YAML of the top level."""
+    """An experiment like config/BASE on LCM at `url`, for a busy machine; `more` is YAML of the top level."""
     config = folder / pathlib.Path(base).name
-    config.write_text(f"include: {ROOT}/config/{base}\nname: under_test\n{more}daemon: {{lcm: {{url: \"{url}\"}}}}\n",
+    config.write_text(f"include: {ROOT}/config/{base}\nname: under_test\n{more}daemon: {{lcm: {{url: \"{url}\", command_validity_s: 0.3}}}}\n",
                       encoding="utf-8")
     return config
 

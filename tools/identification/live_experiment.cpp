@@ -96,6 +96,7 @@ class LiveExperiment {
         Eigen::Map<const Eigen::VectorXd>(bar.data(), std::ssize(bar));
     for (std::int64_t now_ns = monotonic_now_ns(); now_ns < until_ns; now_ns = monotonic_now_ns()) {
       if (stop_requested()) return "stopped";
+      if (commander_.held_up()) return Commander::kHeldUp;
       if (std::string why = listener_.beyond_limits(kLost_ns); !why.empty()) return why;
       const std::int64_t due_ns = commander_.next_ns();
       commander_.update(wanted_bar, experiment_.actuation.slew_bar_per_s, now_ns);

@@ -62,7 +62,10 @@ void Commander::send(std::int64_t now_ns) {
   next_ns_ = now_ns + period_ns_;
   // A stall that the last command did not outlive, were it since `now_ns`, has vented the valves.
   const std::int64_t sent_us = monotonic_now_ns() / 1000;
-  if (sent_us - message_.time_us >= message_.validity_us) bar_.setZero();
+  if (sent_us - message_.time_us >= message_.validity_us) {
+    bar_.setZero();
+    held_up_ |= message_.sequence > 0;
+  }
   ++message_.sequence;
   message_.time_us = sent_us;
   message_.pressure_bar.assign(bar_.begin(), bar_.end());

@@ -16,6 +16,9 @@ namespace softarm {
 /// valves vents by itself when we fall silent (daemon.lcm.command_validity_s).
 class Commander {
  public:
+  static constexpr const char* kHeldUp =
+      "this program was held up for longer than daemon.lcm.command_validity_s, so the valves "
+      "vented";
   /// @throws OtherInstance where softarmd, or another such tool, commands this arm already
   Commander(const Experiment& experiment, LcmNode& node);
 
@@ -29,6 +32,9 @@ class Commander {
   void vent_to_rest();
 
   const PressureVector& sent_bar() const { return bar_; }
+  /// A command came after the one before was no longer valid: the valves have vented meanwhile, and
+  /// what the arm did since is no answer to what was commanded.
+  bool held_up() const { return held_up_; }
   std::int64_t next_ns() const { return next_ns_; }
   int chambers() const { return static_cast<int>(bar_.size()); }
 
@@ -41,6 +47,7 @@ class Commander {
   const Experiment& experiment_;
   PressureRamps vent_ramps_;
   PressureVector bar_;
+  bool held_up_ = false;
   std::int64_t period_ns_, next_ns_ = 0, updated_ns_ = 0;
   softarm_messages::pressure_command_t message_;
 };

@@ -55,7 +55,9 @@ class Player {
   void command(const PressureVector& bar, const Done& done) {
     for (std::int64_t now_ns = monotonic_now_ns(); !done(now_ns); now_ns = monotonic_now_ns()) {
       if (aborted_.empty())
-        aborted_ = stop_ && stop_() ? "stopped" : listener_.beyond_limits(lost_ns_);
+        aborted_ = stop_ && stop_()       ? "stopped"
+                   : commander_.held_up() ? Commander::kHeldUp
+                                          : listener_.beyond_limits(lost_ns_);
       if (!aborted_.empty()) return;
       commander_.update(bar, kSoft_bar_per_s, now_ns);
       node_.wait_until(commander_.next_ns());

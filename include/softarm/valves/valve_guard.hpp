@@ -122,13 +122,15 @@ class ValveGuard {
   void failed(LinkResult result, std::int64_t now_ns) noexcept;
   ValveReason fault(const ReadBack& read_back, int& chamber) const noexcept;
   int stuck_chamber(const ReadBack& read_back, std::int64_t now_ns) noexcept;
-  void update_running() noexcept;
+  void wait_for_zero() noexcept;
+  void update_running(std::int64_t now_ns) noexcept;
   void update_set_points(std::int64_t now_ns) noexcept;
 
   ValveGuardSettings settings_;
   std::int64_t period_ns_, failsafe_ns_, gap_ns_, first_backoff_ns_, longest_backoff_ns_,
       stuck_after_ns_;
   int good_cycles_needed_;
+  std::int64_t validity_ns_;  ///< of a command, at most
 
   CommandExpiry expiry_;
   ValveState state_ = ValveState::disconnected;
@@ -139,9 +141,10 @@ class ValveGuard {
   std::int64_t backoff_ns_;
   std::int64_t since_ns_ = 0;  ///< when starting began, or the first of `failures_` happened
   std::int64_t written_ns_ = kLongAgo;
-  std::int64_t answered_ns_ = 0;  ///< the cycle of the newest exchange that went well
-  int failures_ = 0;              ///< in a row
-  int good_cycles_ = 0;           ///< in a row
+  std::int64_t listening_since_ns_ = kLongAgo;  ///< for commands of zero, or none
+  std::int64_t answered_ns_ = 0;                ///< the cycle of the newest exchange that went well
+  int failures_ = 0;                            ///< in a row
+  int good_cycles_ = 0;                         ///< in a row
   bool must_see_zero_;
   bool rising_ = true;  ///< on the way from vented to what is commanded
   bool stopping_ = false;

@@ -286,6 +286,29 @@ TEST_F(Guard, AGapInTimeIsADoubt) {
   EXPECT_TRUE(reach(ValveState::running));
 }
 
+// Held up, we hear nobody: that is no silence of the one who commands.
+TEST_F(Guard, WithExplicitArmingWhatWeCouldNotHearIsNoSilence) {
+  settings.wait_for_zero = true;
+  make();
+  commanding = true;
+  wanted = {0.0, 0.0};
+  ASSERT_TRUE(reach(ValveState::running));
+  wanted = {0.5, 1.0};
+  for (int k = 0; k < 100; ++k) cycle();
+  now += 300 * kMs;
+  commanding = false;  // none comes in the cycle after the gap
+  cycle();
+  commanding = true;
+  for (int k = 0; k < 300; ++k) {
+    cycle();
+    ASSERT_NE(guard->state(), ValveState::running) << k;
+  }
+  EXPECT_EQ(guard->reason(), ValveReason::waiting_for_zero);
+  wanted = {0.0, 0.0};
+  cycle();
+  EXPECT_TRUE(reach(ValveState::running));
+}
+
 // What is a gap depends on the terminal: it may have vented already.
 TEST_F(Guard, NoGapIsLongerThanTheTerminalsOwnTimeOut) {
   settings.driver.failsafe_timeout_s = 0.02;
