@@ -285,6 +285,7 @@ TEST_F(ValvesBehindARelay, WithExplicitArmingCommandsOfZeroComeFirst) {
   begin("", ", arming: explicit");
   ASSERT_TRUE(wait_for([&] { return is(ValveState::vented, ValveReason::no_command); }))
       << driver_->printed();
+  wait_for([] { return false; }, -1.0, 0.3);  // longer than command_validity_s: that is silence
   ASSERT_TRUE(run_at(0.3)) << driver_->printed();
   relay_->cut_next_write = true;
   ASSERT_TRUE(wait_for([&] { return is(ValveState::vented, ValveReason::waiting_for_zero); }, 0.3))
