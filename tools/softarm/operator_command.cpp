@@ -3,11 +3,11 @@
 
 #include <chrono>
 #include <cstdio>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <functional>
 #include <memory>
-#include <regex>
 #include <softarm_messages/controller_status_t.hpp>
 #include <softarm_messages/deadman_t.hpp>
 #include <softarm_messages/operator_command_t.hpp>
@@ -78,23 +78,28 @@ std::string state_text(const controller_status_t& status) {
                      name(static_cast<Reason>(status.reason)));
 }
 
+/// What stands behind "KEY:" in a line of YAML, or nothing.
+std::string value_of(const std::string& key, const std::string& line) {
+  const std::size_t at = line.find(key + ":");
+  if (at == std::string::npos || (at > 0 && std::strchr(" {,", line[at - 1]) == nullptr)) return "";
+  const std::size_t begin = line.find_first_not_of(" \"'", at + key.size() + 1);
+  if (begin == std::string::npos) return "";
+  return line.substr(begin, line.find_first_of(" \"',}", begin) - begin);
+}
+
 /// What can be read of daemon.lcm in a configuration that is wrong somewhere, or no YAML at all;
 /// the rest by default. These keys stand nowhere else.
 void read_network(const std::filesystem::path& file, LcmSettings& lcm, int includes_left = 8) {
-  static const std::regex kEntry(
-      R"((?:^|[\s{,])(include|url|operator_channel|status_channel):\s*["']?([^\s"',}]+))");
+  const std::pair<const char*, std::string*> keys[] = {{"url", &lcm.url},
+                                                       {"operator_channel", &lcm.operator_channel},
+                                                       {"status_channel", &lcm.status_channel}};
   std::ifstream text(file);
   for (std::string line; std::getline(text, line);) {
-    line = line.substr(0, line.find(" #"));
-    if (line.starts_with('#')) continue;
-    for (std::sregex_iterator entry(line.begin(), line.end(), kEntry), end; entry != end; ++entry) {
-      const std::string key = (*entry)[1], value = (*entry)[2];
-      if (key == "include" && includes_left > 0)
-        read_network(file.parent_path() / value, lcm, includes_left - 1);
-      if (key == "url") lcm.url = value;
-      if (key == "operator_channel") lcm.operator_channel = value;
-      if (key == "status_channel") lcm.status_channel = value;
-    }
+    line = line.substr(0, line.find('#'));
+    if (const std::string other = value_of("include", line); !other.empty() && includes_left > 0)
+      read_network(file.parent_path() / other, lcm, includes_left - 1);
+    for (const auto& [key, setting] : keys)
+      if (const std::string value = value_of(key, line); !value.empty()) *setting = value;
   }
 }
 
