@@ -57,22 +57,24 @@ class Checks {
     if (!holds) throw keys_.error_at(key, expected, got);
   }
 
-  /// A key's value against a bound, with what that is and why.
+  /// A key's value against a bound: what that is, and why.
   void compare(bool holds, const char* relation, const std::string& key, double value, double bound,
-               const std::string& what) const {
+               const char* what, const char* why) const {
     const std::string_view unit = Key{key.c_str(), ""}.unit();
-    const char* space = unit.empty() ? "" : " ";
-    require(holds, key, fmt::format("{} {} ({:.6g}{}{})", relation, what, bound, space, unit),
-            fmt::format("{:.6g}{}{}", value, space, unit));
+    const std::string unit_behind = unit.empty() ? "" : fmt::format(" {}", unit);
+    require(holds, key, fmt::format("{} {} ({:.6g}{}){}", relation, what, bound, unit_behind, why),
+            fmt::format("{:.6g}{}", value, unit_behind));
   }
   void at_least(const std::string& key, double value, double bound, const char* what) const {
-    compare(value >= bound, "at least", key, value, bound, what);
+    compare(value >= bound, "at least", key, value, bound, what, "");
   }
-  void above(const std::string& key, double value, double bound, const char* what) const {
-    compare(value > bound, "more than", key, value, bound, what);
+  void above(const std::string& key, double value, double bound, const char* what,
+             const char* why = "") const {
+    compare(value > bound, "more than", key, value, bound, what, why);
   }
-  void below(const std::string& key, double value, double bound, const char* what) const {
-    compare(value < bound, "less than", key, value, bound, what);
+  void below(const std::string& key, double value, double bound, const char* what,
+             const char* why = "") const {
+    compare(value < bound, "less than", key, value, bound, what, why);
   }
 
   template <typename Set, typename Item>
@@ -220,24 +222,24 @@ class Checks {
     const double hold_s = 1e-9 * static_cast<double>(resolved.hold_after_ns);
     const double vent_s = 1e-9 * static_cast<double>(resolved.vent_after_ns);
     if (it.vent_after_s == 0.0 && it.hold_after_s > 0.0) {
-      below("daemon.safety.hold_after_s", hold_s, vent_s,
-            "vent_after_s, which is left out: without it HOLD is never reached; give both");
+      below("daemon.safety.hold_after_s", hold_s, vent_s, "vent_after_s, left out",
+            ": otherwise HOLD is never reached; give both");
     }
-    above("daemon.safety.vent_after_s", vent_s, hold_s,
-          "hold_after_s: otherwise HOLD is never reached; give both");
+    above("daemon.safety.vent_after_s", vent_s, hold_s, "hold_after_s",
+          ": otherwise HOLD is never reached; give both");
     above("daemon.safety.hold_after_s", hold_s, it.frame_period_s + it.frame_latency_s,
-          "frame_period_s + frame_latency_s: otherwise HOLD is never left");
-    above("daemon.safety.vent_overruns", it.vent_overruns, it.hold_overruns,
-          "hold_overruns: otherwise they never cause HOLD");
+          "frame_period_s + frame_latency_s", ": otherwise HOLD is never left");
+    above("daemon.safety.vent_overruns", it.vent_overruns, it.hold_overruns, "hold_overruns",
+          ": otherwise they never cause HOLD");
     at_least("daemon.safety.max_latency_s", it.max_latency_s, it.frame_latency_s,
              "frame_latency_s");
     above("estimation.max_speed_radps", experiment_.estimation.max_speed_radps,
-          experiment_.control.max_speed_radps,
-          "control.max_speed_radps: otherwise frames are rejected before that limit is seen");
+          experiment_.control.max_speed_radps, "control.max_speed_radps",
+          ": otherwise frames are rejected before that limit is seen");
     if (it.valve_readback) {
       below("daemon.safety.pressure_tolerance_bar", it.pressure_tolerance_bar,
-            experiment_.actuation.max_pressure_bar,
-            "actuation.max_pressure_bar: otherwise no leak is ever seen");
+            experiment_.actuation.max_pressure_bar, "actuation.max_pressure_bar",
+            ": otherwise no leak is ever seen");
     }
     for (const auto& [key, time_s] :
          {std::pair("safety.valve_silence_s", it.valve_silence_s),
@@ -304,10 +306,10 @@ class Checks {
     at_least("valves.longest_backoff_s", it.longest_backoff_s, it.backoff_s, "backoff_s");
     if (safety.valve_readback) {
       above("daemon.safety.valve_silence_s", safety.valve_silence_s, silent_s,
-            "tolerated_failures + 1 periods of valves.rate_hz: otherwise none is tolerated");
+            "tolerated_failures + 1 periods of valves.rate_hz", ": otherwise none is tolerated");
     }
-    below("valves.stuck_bar", it.stuck_bar, max_bar,
-          "actuation.max_pressure_bar: otherwise no valve ever counts as stuck");
+    below("valves.stuck_bar", it.stuck_bar, max_bar, "actuation.max_pressure_bar",
+          ": otherwise no valve ever counts as stuck");
     const double least_s = std::max(it.registers.timeout_least_s, silent_s);
     require(it.failsafe_timeout_s >= least_s, "valves.failsafe_timeout_s",
             fmt::format("at least {:.6g} s (what the terminal takes, and tolerated_failures + 1 "
