@@ -43,9 +43,8 @@ enum class Presence { optional, required };
 /// How a section is printed.
 enum class SectionKind {
   plain,
-  defaults_elsewhere,  ///< its defaults are values of other sections: the template only hints at it
-  defaults_by_choice,  ///< its defaults depend on the key before: the template only hints at it
-  input_only           ///< turned into values of other keys: not part of the resolved configuration
+  hint,       ///< its defaults follow from other keys: in the template a comment
+  input_only  ///< the same, and turned into values of other keys: not printed otherwise
 };
 
 struct Key {
