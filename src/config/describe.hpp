@@ -46,6 +46,6 @@ struct PhaseKind {
   const char* name;
   ReferenceKind empty;
 };
-extern const std::array<PhaseKind, 7> kPhaseKinds;
+const std::array<PhaseKind, 7>& phase_kinds();
 
 }  // namespace softarm

@@ -65,15 +65,18 @@ static void describe(Keys& key, TipPathReference& it) {
   KEY(rate_radps, from(0, 1e3), "of the path");
 }
 
-const std::array<PhaseKind, 7> kPhaseKinds = {{
-    {"set_point", SetPointReference{}},
-    {"paper", PaperReference{}},
-    {"way_points", WayPointReference{}},
-    {"live", LiveReference{}},
-    {"tip_point", TipPathReference{.shape = TipPathShape::point}},
-    {"tip_circle", TipPathReference{.shape = TipPathShape::circle}},
-    {"tip_lemniscate", TipPathReference{.shape = TipPathShape::lemniscate}},
-}};
+const std::array<PhaseKind, 7>& phase_kinds() {
+  static const std::array<PhaseKind, 7> kKinds = {{
+      {"set_point", SetPointReference{}},
+      {"paper", PaperReference{}},
+      {"way_points", WayPointReference{}},
+      {"live", LiveReference{}},
+      {"tip_point", TipPathReference{.shape = TipPathShape::point}},
+      {"tip_circle", TipPathReference{.shape = TipPathShape::circle}},
+      {"tip_lemniscate", TipPathReference{.shape = TipPathShape::lemniscate}},
+  }};
+  return kKinds;
+}
 
 /// Index of the kind of a phase.
 static int kind_of(const ReferenceKind& kind) {
@@ -82,8 +85,8 @@ static int kind_of(const ReferenceKind& kind) {
 }
 
 void describe_reference(Keys& key, ReferenceSettings& it) {
-  std::array<const char*, kPhaseKinds.size()> names;
-  for (std::size_t i = 0; i < names.size(); ++i) names[i] = kPhaseKinds[i].name;
+  std::vector<const char*> names;
+  for (const PhaseKind& kind : phase_kinds()) names.push_back(kind.name);
   const Key list = {"reference", "phases one after the other; time starts at ACTIVE", kRequired};
   key.list(list, it.phases, [&](ReferencePhase& phase) {
     int kind = kind_of(phase.kind);
@@ -91,7 +94,7 @@ void describe_reference(Keys& key, ReferenceSettings& it) {
         "set_point: hold; paper: (24); way_points; live: what comes over LCM; tip_...: a path of "
         "the tip by (21), tip_lemniscate: (22)",
         kRequired);
-    if (key.reading()) phase.kind = kPhaseKinds[static_cast<std::size_t>(kind)].empty;
+    if (key.reading()) phase.kind = phase_kinds()[static_cast<std::size_t>(kind)].empty;
     key.when(&phase != &it.phases.back(), [&] {
       key("duration_s", phase.duration_s, above(0, kMany),
           "of the phase; the last one lasts for ever and has none", kRequired);
@@ -186,7 +189,7 @@ static void describe(Keys& key, RealtimeSettings& it) {
   KEY(lock_memory, "mlockall");
 }
 
-const std::array<ChannelKey, 11> kChannelKeys = {{
+constinit const std::array<ChannelKey, 11> kChannelKeys = {{
     {"mocap_channel", &LcmSettings::mocap_channel, 1,
      "frames; left out: OPTITRACK_FRAMES for optitrack; VICON for rigid_transform, where it is "
      "what "

@@ -99,7 +99,7 @@ std::string template_text() {
 std::string schema_text() {
   Experiment example = example_experiment();
   example.reference.phases.clear();
-  for (const PhaseKind& kind : kPhaseKinds)
+  for (const PhaseKind& kind : phase_kinds())
     example.reference.phases.emplace_back().kind = kind.empty;
   return json_schema_text(entries_of(example, Keys::Purpose::schema));
 }
