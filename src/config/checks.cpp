@@ -14,6 +14,8 @@
 #include "softarm/actuation/pressure_allocator.hpp"
 #include "softarm/control/curvature_controller.hpp"
 #include "softarm/control/reference.hpp"
+#include "softarm/runtime/settings.hpp"
+#include "softarm/transport/settings.hpp"
 #include "softarm/valves/register_map.hpp"
 
 namespace softarm {
@@ -32,7 +34,7 @@ class Checks {
   void run() const {
     check_rotation("arm.base.rotation", experiment_.arm.base_rotation);
     check_rotation("plant.arm.base.rotation", experiment_.plant.arm.base_rotation);
-    check_rotation("daemon.mocap.axes", experiment_.daemon.mocap.axes);
+    check_rotation("daemon.mocap.axes", experiment_.transport.mocap.axes);
     check_radius("arm", experiment_.arm, false);
     check_radius("plant.arm", experiment_.plant.arm, experiment_.plant.kind == PlantKind::links);
     check_actuation("actuation", experiment_.actuation);
@@ -102,7 +104,7 @@ class Checks {
     const bool torque = experiment_.actuation.kind == ActuationKind::torque;
     require(experiment_.plant.actuation.kind == experiment_.actuation.kind, "plant.actuation.kind",
             "the same as actuation.kind", torque ? "chambers" : "torque");
-    require(!torque || !experiment_.daemon.safety.valve_readback, "daemon.safety.valve_readback",
+    require(!torque || !experiment_.safety.valve_readback, "daemon.safety.valve_readback",
             "false with actuation by torque: it is for simulated arms, which have no valves then",
             "true");
     for (std::size_t i = 0; i < experiment_.actuation.segments.size(); ++i) {
@@ -169,7 +171,7 @@ class Checks {
   }
 
   void check_bodies() const {
-    const BodySettings& bodies = experiment_.daemon.bodies;
+    const BodySettings& bodies = experiment_.transport.bodies;
     std::set<int> seen;
     for (const int id : bodies.segment_ids) {
       require(seen.insert(id).second, "daemon.bodies.segment_ids", "every body once",
@@ -190,23 +192,23 @@ class Checks {
 
   /// Where every body has a channel of its own.
   void check_body_channels(std::set<std::string>& seen) const {
-    const DaemonSettings& daemon = experiment_.daemon;
-    if (daemon.mocap.source != MocapSourceKind::rigid_transform) return;
+    const TransportSettings& transport = experiment_.transport;
+    if (transport.mocap.source != MocapSourceKind::rigid_transform) return;
     const auto check = [&](const std::string& key, const PlateSettings& plate) {
       check_word(key, plate.name);
-      const std::string channel = body_channel(daemon.lcm, plate);
+      const std::string channel = body_channel(transport.lcm, plate);
       require(channel.size() <= 63, key, "a channel of at most 63 characters", channel);
       require(seen.insert(channel).second, key, "a channel of its own",
               "\"" + channel + "\", which another key names too");
     };
-    if (daemon.bodies.base_id >= 0)
-      check("daemon.bodies.base_plate.name", daemon.bodies.base_plate);
-    for (const PlateSettings& plate : daemon.bodies.segment_plates)
+    if (transport.bodies.base_id >= 0)
+      check("daemon.bodies.base_plate.name", transport.bodies.base_plate);
+    for (const PlateSettings& plate : transport.bodies.segment_plates)
       check("daemon.bodies.segment_plates", plate);
   }
 
   void check_safety() const {
-    const SafetySettings& safety = experiment_.daemon.safety;
+    const SafetySettings& safety = experiment_.safety;
     require(safety.hold_after_s == 0.0 || safety.vent_after_s == 0.0 ||
                 safety.hold_after_s <= safety.vent_after_s,
             "daemon.safety.vent_after_s",
@@ -218,20 +220,20 @@ class Checks {
     require(safety.frame_latency_s <= safety.max_latency_s, "daemon.safety.max_latency_s",
             fmt::format("at least frame_latency_s ({} s)", safety.frame_latency_s),
             fmt::format("{} s", safety.max_latency_s));
-    const double period_s = 1.0 / experiment_.daemon.rate_hz;
+    const double period_s = 1.0 / experiment_.rate_hz;
     for (const auto& [key, time_s] : {std::pair{"valve_silence_s", safety.valve_silence_s},
                                       std::pair{"deadman_timeout_s", safety.deadman_timeout_s}})
       require(time_s >= 2.0 * period_s, fmt::format("daemon.safety.{}", key),
               fmt::format("at least two ticks of daemon.rate_hz ({:.6g} s)", 2.0 * period_s),
               fmt::format("{} s", time_s));
-    require(experiment_.daemon.lcm.command_validity_s >= 2.0 * period_s,
+    require(experiment_.safety.command_validity_s >= 2.0 * period_s,
             "daemon.lcm.command_validity_s",
             fmt::format("at least two ticks of daemon.rate_hz ({:.6g} s)", 2.0 * period_s),
-            fmt::format("{} s", experiment_.daemon.lcm.command_validity_s));
+            fmt::format("{} s", experiment_.safety.command_validity_s));
   }
 
   void check_lcm() const {
-    const LcmSettings& lcm = experiment_.daemon.lcm;
+    const LcmSettings& lcm = experiment_.transport.lcm;
     const std::pair<const char*, const std::string&> channels[] = {
         {"mocap_channel", lcm.mocap_channel},
         {"command_channel", lcm.command_channel},

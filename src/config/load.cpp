@@ -64,6 +64,8 @@ Experiment read(const std::filesystem::path& file) {
   ExperimentReader reader(root);
   Experiment experiment;
   reader.read([&] { describe_experiment(reader, experiment); });
+  experiment.estimation.base_is_fixed = experiment.transport.bodies.base_id < 0;
+  experiment.safety.deadman = !experiment.transport.lcm.deadman_channel.empty();
   check_consistency(experiment, reader);
   experiment.hash = fnv1a(resolved_text(experiment));
   return experiment;

@@ -308,7 +308,7 @@ void describe_experiment(SchemaVisitor& visitor, Experiment& experiment) {
                   [&] { describe_control(visitor, experiment.control, n); });
   describe_reference(visitor, experiment.reference, n);
   visitor.section({"daemon", "", "rate, safety and connections of softarmd"}, SectionKind::plain,
-                  [&] { describe_daemon(visitor, experiment.daemon, n); });
+                  [&] { describe_daemon(visitor, experiment, n); });
   int chambers = 0;
   for (const auto& segment : experiment.actuation.segments)
     chambers += static_cast<int>(segment.size());

@@ -122,7 +122,7 @@ ActuationKind describe_actuation_kind(SchemaVisitor& visitor, ActuationSettings&
 void describe_estimation(SchemaVisitor& visitor, EstimationSettings& estimation);
 void describe_control(SchemaVisitor& visitor, ControllerSettings& control, int segments);
 void describe_reference(SchemaVisitor& visitor, ReferenceSettings& reference, int segments);
-void describe_daemon(SchemaVisitor& visitor, DaemonSettings& daemon, int segments);
+void describe_daemon(SchemaVisitor& visitor, Experiment& experiment, int segments);
 void describe_plant(SchemaVisitor& visitor, Experiment& experiment);
 /// `chambers` of the whole arm.
 void describe_valves(SchemaVisitor& visitor, ValveDriverSettings& valves, int chambers);

@@ -6,6 +6,9 @@
 #include <string>
 
 #include "config/schema.hpp"
+#include "softarm/base/realtime.hpp"
+#include "softarm/runtime/settings.hpp"
+#include "softarm/transport/settings.hpp"
 
 namespace softarm {
 namespace {
@@ -165,7 +168,7 @@ void describe_safety(SchemaVisitor& visitor, SafetySettings& safety) {
       safety.deadman_timeout_s);
 }
 
-void describe_lcm(SchemaVisitor& visitor, LcmSettings& lcm) {
+void describe_lcm(SchemaVisitor& visitor, LcmSettings& lcm, double& command_validity_s) {
   const auto channel = [&](const char* key, const char* doc, std::string& value) {
     visitor.text({key, "", doc, from_to(1, 63)}, value);
   };
@@ -193,7 +196,7 @@ void describe_lcm(SchemaVisitor& visitor, LcmSettings& lcm) {
       lcm.deadman_channel);
   visitor.number({"command_validity_s", "s", "after which the valve side vents by itself",
                   above_to(0.0, 10.0)},
-                 lcm.command_validity_s);
+                 command_validity_s);
 }
 
 void describe_realtime(SchemaVisitor& visitor, RealtimeSettings& realtime) {
@@ -205,7 +208,7 @@ void describe_realtime(SchemaVisitor& visitor, RealtimeSettings& realtime) {
   visitor.flag({"lock_memory", "", "mlockall"}, realtime.lock_memory);
 }
 
-void describe_mocap(SchemaVisitor& visitor, DaemonSettings& daemon) {
+void describe_mocap(SchemaVisitor& visitor, TransportSettings& transport) {
   static const std::array<const char*, 3> kSources = {"softarm", "optitrack", "rigid_transform"};
   static const std::array<const char*, 2> kUnits = {"m", "mm"};
   static const std::array<const char*, 2> kOrders = {"xyzw", "wxyz"};
@@ -213,7 +216,7 @@ void describe_mocap(SchemaVisitor& visitor, DaemonSettings& daemon) {
   static const std::array<Eigen::Matrix3d, 2> kRotations = {
       Eigen::Matrix3d::Identity(),
       (Eigen::Matrix3d() << 1.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 1.0, 0.0).finished()};
-  MocapSourceSettings& mocap = daemon.mocap;
+  MocapSourceSettings& mocap = transport.mocap;
   visitor.choice({"source", "",
                   "softarm: mocap_frame_t; optitrack: optitrack_frame_t; rigid_transform: "
                   "rigid_transform_t (Vicon), one channel a body"},
@@ -222,8 +225,8 @@ void describe_mocap(SchemaVisitor& visitor, DaemonSettings& daemon) {
     const auto kind = mocap.source;
     const bool optitrack = kind == MocapSourceKind::optitrack;
     mocap.quaternion = optitrack ? QuaternionOrder::xyzw : QuaternionOrder::wxyz;
-    if (optitrack) daemon.lcm.mocap_channel = "OPTITRACK_FRAMES";
-    if (kind == MocapSourceKind::rigid_transform) daemon.lcm.mocap_channel = "VICON";
+    if (optitrack) transport.lcm.mocap_channel = "OPTITRACK_FRAMES";
+    if (kind == MocapSourceKind::rigid_transform) transport.lcm.mocap_channel = "VICON";
   }
   visitor.choice({"unit", "", "of the positions sent"}, kUnits, mocap.unit);
   visitor.choice({"quaternion", "", "order sent; left out: xyzw for optitrack, wxyz otherwise"},
@@ -328,24 +331,26 @@ void describe_reference(SchemaVisitor& visitor, ReferenceSettings& reference, in
       });
 }
 
-void describe_daemon(SchemaVisitor& visitor, DaemonSettings& daemon, int segments) {
+void describe_daemon(SchemaVisitor& visitor, Experiment& experiment, int segments) {
+  TransportSettings& transport = experiment.transport;
   static const std::array<const char*, 2> kCaptureTimes = {"sender", "latency"};
-  visitor.number({"rate_hz", "Hz", "of the tick", from_to(1.0, 20000.0)}, daemon.rate_hz);
+  visitor.number({"rate_hz", "Hz", "of the tick", from_to(1.0, 20000.0)}, experiment.rate_hz);
   visitor.choice({"capture_time", "",
                   "sender: its clock, related to ours; latency: arrival minus frame_latency_s"},
-                 kCaptureTimes, daemon.capture_time);
+                 kCaptureTimes, transport.capture_time);
   visitor.section({"safety", "", "thresholds of the safety monitor"}, SectionKind::plain,
-                  [&] { describe_safety(visitor, daemon.safety); });
+                  [&] { describe_safety(visitor, experiment.safety); });
   visitor.section({"mocap", "", "who sends motion-capture frames, and what the numbers mean"},
-                  SectionKind::plain, [&] { describe_mocap(visitor, daemon); });
-  const bool named = daemon.mocap.source == MocapSourceKind::rigid_transform;
+                  SectionKind::plain, [&] { describe_mocap(visitor, transport); });
+  const bool named = transport.mocap.source == MocapSourceKind::rigid_transform;
   visitor.section({"bodies", "", "which bodies of a frame carry the base and the segments' ends"},
                   SectionKind::plain,
-                  [&] { describe_bodies(visitor, daemon.bodies, segments, named); });
+                  [&] { describe_bodies(visitor, transport.bodies, segments, named); });
   visitor.section({"realtime", "", "the daemon's place on the machine"}, SectionKind::plain,
-                  [&] { describe_realtime(visitor, daemon.realtime); });
-  visitor.section({"lcm", "", "channels, distinct where two arms share a machine"},
-                  SectionKind::plain, [&] { describe_lcm(visitor, daemon.lcm); });
+                  [&] { describe_realtime(visitor, experiment.realtime); });
+  visitor.section(
+      {"lcm", "", "channels, distinct where two arms share a machine"}, SectionKind::plain,
+      [&] { describe_lcm(visitor, transport.lcm, experiment.safety.command_validity_s); });
 }
 
 }  // namespace softarm

@@ -9,9 +9,10 @@
 #include "softarm/control/gain_check.hpp"
 #include "softarm/control/reference.hpp"
 #include "softarm/control/task_space_path.hpp"
-#include "softarm/daemon/safety_monitor.hpp"
 #include "softarm/model/actuation_matrix.hpp"
 #include "softarm/model/dynamics.hpp"
+#include "softarm/runtime/safety_monitor.hpp"
+#include "softarm/runtime/settings.hpp"
 
 namespace softarm {
 namespace {
@@ -79,8 +80,8 @@ class StaticReach {
 
 /// What the configuration declares of the loop, whoever closes it.
 LoopSampling sampling_of(const Experiment& experiment) {
-  const SafetySettings& safety = experiment.daemon.safety;
-  return {.control_period_s = 1.0 / experiment.daemon.rate_hz,
+  const SafetySettings& safety = experiment.safety;
+  return {.control_period_s = 1.0 / experiment.rate_hz,
           .frame_period_s = safety.frame_period_s,
           .frame_latency_s = safety.frame_latency_s,
           .filter_bandwidth_radps = experiment.estimation.filter_bandwidth_radps,
@@ -119,7 +120,7 @@ std::vector<std::string> experiment_warnings(const Experiment& experiment) {
   }
 
   const SafetyThresholds thresholds =
-      resolve_thresholds(experiment.daemon.safety, 1.0 / experiment.daemon.rate_hz);
+      resolve_thresholds(experiment.safety, 1.0 / experiment.rate_hz);
   const MocapSettings& mocap = experiment.plant.mocap;
   const double oldest_s = mocap.latency_s + 1.0 / mocap.rate_hz;
   const double hold_s = 1e-9 * static_cast<double>(thresholds.hold_after_ns);

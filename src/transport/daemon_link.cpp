@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "softarm/runtime/settings.hpp"
 #include "softarm/transport/message_decoding.hpp"
+#include "softarm/transport/settings.hpp"
 
 namespace softarm {
 namespace {
@@ -25,10 +27,11 @@ std::int64_t wall_clock_ns() noexcept {
 
 }  // namespace
 
-DaemonLink::DaemonLink(const PipelineSettings& settings, const Provenance& provenance, bool shadow)
-    : settings_(settings.daemon),
-      mocap_(settings.daemon, settings.arm),
-      node_(settings.daemon.lcm.url),
+DaemonLink::DaemonLink(const PipelineSettings& settings, const TransportSettings& transport,
+                       const Provenance& provenance, bool shadow)
+    : lcm_(transport.lcm),
+      mocap_(transport, settings.safety, settings.arm),
+      node_(transport.lcm.url),
       dof_(settings.arm.dof()),
       messages_(settings, provenance, shadow),
       newest_measurement_ns_(kNever),
@@ -36,7 +39,7 @@ DaemonLink::DaemonLink(const PipelineSettings& settings, const Provenance& prove
       go_sequence_(kNever),
       reference_sequence_(kNever),
       operator_sequence_(kNever) {
-  if (!settings_.lcm.tick_channel.empty()) recorder_.emplace(settings, provenance, shadow);
+  if (!lcm_.tick_channel.empty()) recorder_.emplace(settings, provenance, shadow);
   frames_.resize(static_cast<std::size_t>(
       recorder_ ? std::min(kFrameCapacity, recorder_->frame_capacity()) : kFrameCapacity));
   // Everything that grows is grown here, so that the loop never has to.
@@ -49,15 +52,15 @@ DaemonLink::DaemonLink(const PipelineSettings& settings, const Provenance& prove
   for (std::size_t k = 0; k < mocap_.channels().size(); ++k)
     node_.subscribe(mocap_.channels()[k], kFrameCapacity,
                     [this, k](const auto& packet) { take_frame(k, packet); });
-  node_.subscribe(settings_.lcm.reference_channel, kOtherCapacity,
+  node_.subscribe(lcm_.reference_channel, kOtherCapacity,
                   [this](const auto& packet) { take_reference(packet); });
-  node_.subscribe(settings_.lcm.operator_channel, kOtherCapacity,
+  node_.subscribe(lcm_.operator_channel, kOtherCapacity,
                   [this](const auto& packet) { take_operator(packet); });
-  if (settings_.safety.valve_readback)
-    node_.subscribe(settings_.lcm.measurement_channel, kOtherCapacity,
+  if (settings.safety.valve_readback)
+    node_.subscribe(lcm_.measurement_channel, kOtherCapacity,
                     [this](const auto& packet) { take_measurement(packet); });
-  if (!settings_.lcm.deadman_channel.empty())
-    node_.subscribe(settings_.lcm.deadman_channel, kOtherCapacity,
+  if (!lcm_.deadman_channel.empty())
+    node_.subscribe(lcm_.deadman_channel, kOtherCapacity,
                     [this](const auto& packet) { take_go(packet); });
 }
 
@@ -161,7 +164,7 @@ void DaemonLink::publish_command(std::int64_t now_ns, const TickOutput& output) 
     return;
   }
   messages_.pressure_command.time_us = messages_.torque_command.time_us = now_us;
-  const std::string& channel = settings_.lcm.command_channel;
+  const std::string& channel = lcm_.command_channel;
   const bool sent = messages_.by_torque() ? node_.publish(channel, messages_.torque_command)
                                           : node_.publish(channel, messages_.pressure_command);
   if (sent) sent_us_ = now_us;
@@ -179,21 +182,21 @@ void DaemonLink::publish_status(std::int64_t now_ns, const ControlPipeline& pipe
   status.time_us = now_ns / 1000;
   status.overruns = counter(timing.overruns);
   status.messages_malformed = counter(malformed_);
-  if (!node_.publish(settings_.lcm.status_channel, status)) ++unsent_;
+  if (!node_.publish(lcm_.status_channel, status)) ++unsent_;
 }
 
 void DaemonLink::publish_record(const TickInput& input, const TickOutput& output) noexcept {
   if (!recorder_) return;
   if (recorder_->full()) repeat_record();
   const auto bytes = recorder_->record(commands_, input, output.pressure_bar);
-  if (!node_.publish_encoded(settings_.lcm.tick_channel, bytes)) ++unsent_;
+  if (!node_.publish_encoded(lcm_.tick_channel, bytes)) ++unsent_;
 }
 
 bool DaemonLink::repeat_record() noexcept {
   if (!recorder_) return false;
   const auto bytes = recorder_->take_oldest();
   if (bytes.empty()) return false;
-  if (!node_.publish_encoded(settings_.lcm.tick_channel, bytes)) ++unsent_;
+  if (!node_.publish_encoded(lcm_.tick_channel, bytes)) ++unsent_;
   return true;
 }
 
@@ -211,7 +214,7 @@ void DaemonLink::publish_timing(std::int64_t now_ns, const LoopTiming& timing) n
                    counter);
     message.max_us[k] = static_cast<float>(histograms[k]->max_us());
   }
-  if (!node_.publish(settings_.lcm.timing_channel, message)) ++unsent_;
+  if (!node_.publish(lcm_.timing_channel, message)) ++unsent_;
 }
 
 }  // namespace softarm

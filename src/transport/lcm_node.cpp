@@ -1,12 +1,16 @@
 #include "softarm/transport/lcm_node.hpp"
 
+#include <arpa/inet.h>
 #include <lcm/lcm.h>
 #include <poll.h>
 
 #include <algorithm>
+#include <array>
 #include <cctype>
+#include <cstdlib>
+#include <string_view>
 
-#include "softarm/daemon/realtime.hpp"
+#include "softarm/base/clock.hpp"
 
 namespace softarm {
 namespace {
@@ -74,6 +78,25 @@ bool LcmNode::publish_encoded(const std::string& channel,
 
 bool LcmNode::send(const char* channel, int size) noexcept {
   return lcm_publish(lcm_, channel, buffer_.data(), static_cast<unsigned int>(size)) == 0;
+}
+
+std::string lock_name(const std::string& channel, const std::string& url) {
+  constexpr std::string_view kUdp = "udpm://";
+  std::string network = url.substr(0, url.find('?'));
+  if (network.starts_with(kUdp)) {
+    // As LCM 1.3.1 reads it.
+    std::string text = network.substr(kUdp.size());
+    if (text.empty()) text = "239.255.76.67:7667";
+    const std::size_t colon = text.find(':');
+    in_addr address{};
+    if (inet_aton(text.substr(0, colon).c_str(), &address) == 1) {
+      std::array<char, INET_ADDRSTRLEN> digits{};
+      inet_ntop(AF_INET, &address, digits.data(), digits.size());
+      const long port = colon < text.size() ? std::strtol(text.c_str() + colon + 1, nullptr, 0) : 0;
+      network = std::string(kUdp) + digits.data() + ":" + std::to_string(port);
+    }
+  }
+  return channel + " on " + network;
 }
 
 }  // namespace softarm

@@ -2,6 +2,8 @@
 
 #include <span>
 
+#include "softarm/transport/settings.hpp"
+
 namespace softarm {
 namespace {
 

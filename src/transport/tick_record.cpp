@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "softarm/runtime/settings.hpp"
 #include "softarm/transport/lcm_node.hpp"
 
 namespace softarm {
@@ -174,7 +175,7 @@ TickRecorder::TickRecorder(const PipelineSettings& settings, const Provenance& p
                            bool shadow)
     : record_(largest_record(settings, provenance.build)),
       build_(provenance.build),
-      ticks_per_build_(std::max(1LL, std::llround(settings.daemon.rate_hz))),
+      ticks_per_build_(std::max(1LL, std::llround(settings.rate_hz))),
       slot_bytes_(static_cast<std::size_t>(record_.getEncodedSize())),
       slots_(kRepeatAfter * slot_bytes_),
       sizes_(kRepeatAfter) {

@@ -1,7 +1,7 @@
 # find_package(softarm) works from another project: softarm::model, softarm::control, ...
 include(CMakePackageConfigHelpers)
-get_property(rooms GLOBAL PROPERTY SOFTARM_ROOMS)
-install(TARGETS ${rooms} EXPORT softarmTargets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
+get_property(modules GLOBAL PROPERTY SOFTARM_MODULES)
+install(TARGETS ${modules} EXPORT softarmTargets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
 install(DIRECTORY include/softarm DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
 install(DIRECTORY ${SOFTARM_GENERATED_DIR}/lcmtypes/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} FILES_MATCHING PATTERN "*.hpp")
 install(DIRECTORY config/ DESTINATION ${CMAKE_INSTALL_DATADIR}/softarm/config FILES_MATCHING PATTERN "*.yaml"

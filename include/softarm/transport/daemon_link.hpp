@@ -10,11 +10,13 @@
 #include <softarm_messages/timing_t.hpp>
 #include <vector>
 
-#include "softarm/daemon/control_pipeline.hpp"
-#include "softarm/daemon/histogram.hpp"
+#include "softarm/base/histogram.hpp"
+#include "softarm/runtime/control_pipeline.hpp"
+#include "softarm/runtime/settings.hpp"
 #include "softarm/transport/lcm_node.hpp"
 #include "softarm/transport/mocap_source.hpp"
 #include "softarm/transport/output_messages.hpp"
+#include "softarm/transport/settings.hpp"
 #include "softarm/transport/tick_record.hpp"
 
 namespace softarm {
@@ -33,7 +35,8 @@ struct LoopTiming {
 class DaemonLink {
  public:
   /// @throws TransportError
-  DaemonLink(const PipelineSettings& settings, const Provenance& provenance, bool shadow);
+  DaemonLink(const PipelineSettings& settings, const TransportSettings& transport,
+             const Provenance& provenance, bool shadow);
 
   /// Handles what has arrived, a bounded number of messages. The frames it points to live until the
   /// next call.
@@ -66,7 +69,7 @@ class DaemonLink {
   std::int64_t arrival_ns(const ReceivedMessage& packet) const noexcept;
   bool command_expired(std::int64_t now_us) const noexcept;
 
-  DaemonSettings settings_;
+  LcmSettings lcm_;
   MocapSource mocap_;
   LcmNode node_;
   int dof_;

@@ -70,4 +70,8 @@ class LcmNode {
   std::vector<std::byte> buffer_;
 };
 
+/// What instances on an LCM channel lock: neither the options behind the '?' of a URL nor another
+/// spelling of group and port make another network.
+std::string lock_name(const std::string& channel, const std::string& url);
+
 }  // namespace softarm

@@ -7,10 +7,10 @@
 #include <softarm_messages/rigid_transform_t.hpp>
 #include <vector>
 
-#include "softarm/daemon/settings.hpp"
 #include "softarm/estimation/mocap_frame.hpp"
 #include "softarm/model/arm.hpp"
 #include "softarm/transport/optitrack_frame.hpp"
+#include "softarm/transport/settings.hpp"
 
 namespace softarm {
 

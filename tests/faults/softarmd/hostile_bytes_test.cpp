@@ -7,8 +7,9 @@
 #include <iostream>
 #include <thread>
 
-#include "fault/hostile_packets.hpp"
+#include "dev/fault/hostile_packets.hpp"
 #include "faults/softarmd/fault_test.hpp"
+#include "softarm/base/clock.hpp"
 
 namespace softarm {
 namespace {
@@ -68,7 +69,7 @@ TEST_P(HostileBytes, MalformedPacketsWithoutEndAreRefusedWhileTheArmIsControlled
   long memory_kb = 0;
   forget();
 
-  HostilePackets hostile(load_experiment(config_.string()).daemon.lcm, 3, 12, 20261122);
+  HostilePackets hostile(load_experiment(config_.string()).transport.lcm, 3, 12, 20261122);
   RawSender sender(url_);
   const std::int64_t start_ns = monotonic_now_ns();
   const int ticks_before = statuses_;

@@ -4,8 +4,10 @@
 #include <chrono>
 #include <thread>
 
-#include "fault/raw_packets.hpp"
+#include "dev/fault/raw_packets.hpp"
 #include "faults/softarmd/fault_test.hpp"
+#include "softarm/base/clock.hpp"
+#include "softarm/transport/settings.hpp"
 
 namespace softarm {
 namespace {
@@ -32,7 +34,7 @@ TEST_P(MessagesAndLimits, HostileBytesAndAFloodAreCountedAndHarmless) {
 
   ASSERT_TRUE(wait_for([&] { return under_pressure(); })) << told() << daemon->printed();
 
-  const LcmSettings lcm = load_experiment(config_.string()).daemon.lcm;
+  const LcmSettings lcm = load_experiment(config_.string()).transport.lcm;
   const std::vector<Packet> hostile = hostile_packets(lcm);
   RawSender sender(url_);
   const int before = status_.messages_malformed;

@@ -7,8 +7,8 @@
 #include <functional>
 #include <numbers>
 
-#include "lock_step.hpp"
 #include "softarm/config/load.hpp"
+#include "softarm/simulation/lock_step.hpp"
 
 namespace softarm {
 namespace {
@@ -32,10 +32,10 @@ struct Tracking {
 
 Tracking track(const Experiment& experiment, double duration_s, double from_s,
                const std::function<void(const LogRow&)>& look = {}) {
-  LockStep lock_step(experiment);
+  LockStep lock_step(experiment, experiment.plant);
   LogRow row;
   Tracking result;
-  const double period_s = 1.0 / experiment.daemon.rate_hz;
+  const double period_s = 1.0 / experiment.rate_hz;
   for (double t_s = 0.0; t_s < duration_s; t_s += period_s) {
     lock_step.step(row);
     if (look) look(row);
@@ -135,7 +135,7 @@ TEST(ClosedLoop, BendsBeyondNinetyDegrees) {
   experiment.plant.initial_u_rad = SegmentVector::Zero(2);
   experiment.actuation.segments.resize(1);
   experiment.plant.actuation.segments.resize(1);
-  experiment.daemon.bodies.segment_ids.resize(1);
+  experiment.transport.bodies.segment_ids.resize(1);
   experiment.control.kp.resize(2);
   experiment.control.kd.resize(2);
   experiment.control.ki.resize(2);
@@ -178,11 +178,11 @@ TEST(ClosedLoop, SilenceOfTheMotionCaptureHoldsThenVents) {
   // Dropouts so frequent that HOLD must happen, rare enough that the arm comes back.
   Experiment experiment = configured("paper_arm.yaml");
   experiment.plant.mocap.dropout_probability = 0.3;
-  experiment.daemon.safety.good_frames = 5;
+  experiment.safety.good_frames = 5;
   double hold_s = 0.0, largest_step_bar = 0.0;
   PressureVector previous;
   Mode mode = Mode::init;
-  const double period_s = 1.0 / experiment.daemon.rate_hz;
+  const double period_s = 1.0 / experiment.rate_hz;
   const Tracking tracking = track(experiment, 10.0, 0.0, [&](const LogRow& row) {
     if (row.mode == Mode::hold) {
       hold_s += period_s;

@@ -15,10 +15,10 @@
 #include <utility>
 #include <vector>
 
-#include "command_steps.hpp"
+#include "dev/soak/command_steps.hpp"
 #include "integration/processes/process.hpp"
-#include "softarm/daemon/realtime.hpp"
-#include "softarm/daemon/safety_monitor.hpp"
+#include "softarm/base/clock.hpp"
+#include "softarm/runtime/safety_monitor.hpp"
 #include "softarm/transport/lcm_node.hpp"
 #include "softarm/transport/message_decoding.hpp"
 

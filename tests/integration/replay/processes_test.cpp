@@ -9,9 +9,9 @@
 #include <functional>
 
 #include "integration/processes/process.hpp"
+#include "softarm/base/clock.hpp"
 #include "softarm/config/load.hpp"
-#include "softarm/daemon/realtime.hpp"
-#include "softarm/daemon/safety_monitor.hpp"
+#include "softarm/runtime/safety_monitor.hpp"
 #include "softarm/transport/event_log.hpp"
 #include "softarm/transport/lcm_node.hpp"
 #include "softarm/transport/message_decoding.hpp"
@@ -38,7 +38,7 @@ class ReplayOfProcesses : public ::testing::Test {
     url_ = "udpm://239.255.76.67:" + std::to_string(20000 + getpid() % 40000) + "?ttl=0";
     config_ = folder_ / "config.yaml";
     log_ = folder_ / "log";
-    experiment_.daemon.lcm.url = url_;
+    experiment_.transport.lcm.url = url_;
     std::ofstream(config_) << resolved_text(
         experiment_);  // all of it: nothing may change meanwhile
     try {
@@ -205,7 +205,7 @@ TEST_F(ReplayOfProcesses, RecordedWithFaultsIsBitExactAndDamageIsTold) {
   EXPECT_NE(printed_.find("INCOMPLETE"), std::string::npos) << printed_;
 
   // Another configuration.
-  experiment_.daemon.rate_hz = 400.0;
+  experiment_.rate_hz = 400.0;
   std::ofstream(config_) << resolved_text(experiment_);
   EXPECT_EQ(replay(), 78) << printed_;
   EXPECT_NE(printed_.find("--any-configuration"), std::string::npos);

@@ -8,8 +8,9 @@
 #include <vector>
 
 #include "softarm/config/load.hpp"
-#include "softarm/plant/simulated_arm.hpp"
+#include "softarm/simulation/simulated_arm.hpp"
 #include "softarm/transport/output_messages.hpp"
+#include "softarm/transport/settings.hpp"
 #include "softarm/transport/tick_record.hpp"
 
 namespace softarm::test {
@@ -59,7 +60,7 @@ struct RecordedRun {
 inline RecordedRun record_run(const Experiment& experiment, double seconds, bool shadow,
                               LogBytes& log, const Losses& losses = {},
                               std::int64_t start_ns = 7'000'000'000) {
-  const LcmSettings& lcm = experiment.daemon.lcm;
+  const LcmSettings& lcm = experiment.transport.lcm;
   const Provenance provenance{
       .version = "test", .configuration_hash = experiment.hash, .seed = 1, .build = "this build"};
   ControlPipeline pipeline(experiment);

@@ -11,7 +11,7 @@
 
 #include "integration/processes/process.hpp"
 #include "integration/valves/relay.hpp"
-#include "softarm/daemon/realtime.hpp"
+#include "softarm/base/clock.hpp"
 #include "softarm/transport/lcm_node.hpp"
 #include "softarm/transport/message_decoding.hpp"
 #include "softarm/valves/valve_guard.hpp"

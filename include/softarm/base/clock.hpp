@@ -1,0 +1,37 @@
+// The machine's monotonic clock, and deadlines on it.
+#pragma once
+
+#include <cstdint>
+
+namespace softarm {
+
+/// CLOCK_MONOTONIC in ns.
+std::int64_t monotonic_now_ns() noexcept;
+
+/// Sleeps until an absolute time of CLOCK_MONOTONIC; returns early when a signal arrives.
+void sleep_until_ns(std::int64_t deadline_ns) noexcept;
+
+/// Absolute deadlines at a fixed period. Missed ones are skipped, never caught up with.
+class PeriodicDeadline {
+ public:
+  /// @param period_ns > 0  @param first_ns time of the first deadline
+  PeriodicDeadline(std::int64_t period_ns, std::int64_t first_ns) noexcept
+      : period_ns_(period_ns), next_ns_(first_ns) {}
+
+  std::int64_t next_ns() const noexcept { return next_ns_; }
+
+  /// To be called after the work of a deadline; returns how many deadlines were missed and skipped.
+  std::int64_t advance(std::int64_t now_ns) noexcept {
+    next_ns_ += period_ns_;
+    if (now_ns <= next_ns_) return 0;
+    const std::int64_t missed = (now_ns - next_ns_) / period_ns_ + 1;
+    next_ns_ += missed * period_ns_;
+    return missed;
+  }
+
+ private:
+  std::int64_t period_ns_;
+  std::int64_t next_ns_;
+};
+
+}  // namespace softarm

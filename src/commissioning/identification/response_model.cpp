@@ -1,0 +1,267 @@
+#include "softarm/commissioning/identification/response_model.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include "softarm/model/actuation_matrix.hpp"
+
+namespace softarm {
+namespace {
+
+constexpr double kLargest_rad = 20.0;     ///< a response beyond it has lost its arm
+constexpr double kFastest_1ps = 40000.0;  ///< beyond it a simulation takes too long
+constexpr double kStep = 2.0;  ///< times the fastest mode's time constant; stable below 2.78
+
+ArmHypothesis hypothesis(const ArmParameters& arm, const ActuationSettings& actuation) {
+  ArmHypothesis out;
+  out.arm = arm;
+  out.rest_rad.setZero(arm.dof());
+  const bool torque = actuation.kind == ActuationKind::torque;
+  for (std::size_t i = 0; i < actuation.segments.size(); ++i)
+    for (std::size_t j = 0; j < actuation.segments[i].size(); ++j) {
+      const Chamber& chamber = actuation.segments[i][j];
+      out.push.conservativeResize(2, out.push.cols() + 1);
+      if (torque) {  // A_chamber of a unit moment about x, or y
+        out.push.rightCols<1>() << (j == 0 ? 0.0 : 1.0), (j == 0 ? -1.0 : 0.0);
+      } else {
+        out.push.rightCols<1>() << -chamber.gain_nm_per_bar * std::cos(chamber.angle_rad),
+            -chamber.gain_nm_per_bar * std::sin(chamber.angle_rad);
+      }
+      out.segment_of.push_back(static_cast<int>(i));
+    }
+  return out;
+}
+
+/// Storage of one simulation, and the acceleration of (16).
+class Motion {
+ public:
+  explicit Motion(const ArmHypothesis& arm)
+      : arm_(arm),
+        plain_(arm.arm),
+        workspace_(arm.arm),
+        force_(arm.arm.dof()),
+        spring_(arm.arm.dof()) {
+    // The springs are added here, with their rest and their cubic part.
+    for (SegmentParameters& segment : plain_.segments) segment.stiffness_nm_per_rad = 0.0;
+  }
+
+  bool acceleration(const Eigen::VectorXd& u, const Eigen::VectorXd& v,
+                    const Eigen::VectorXd& input, Eigen::VectorXd& a) {
+    push_force(arm_, u, input, force_);
+    spring_force(arm_, u, spring_);
+    force_ -= spring_;
+    return forward_dynamics(plain_, workspace_, u, v, force_, a);
+  }
+
+  /// What is left of the static balance: G + springs - push.
+  void imbalance(const Eigen::VectorXd& u, const Eigen::VectorXd& input, Eigen::VectorXd& out) {
+    push_force(arm_, u, input, force_);
+    spring_force(arm_, u, spring_);
+    inverse_dynamics(plain_, workspace_, u, u, u, u,
+                     {.inertia = false, .coriolis = false, .gravity = true}, out);
+    out += spring_ - force_;
+  }
+
+  bool settle(const Eigen::VectorXd& input, Eigen::VectorXd& u) {
+    const Eigen::Index dof = u.size();
+    Eigen::VectorXd residual(dof), moved(dof), shifted(dof);
+    Eigen::MatrixXd jacobian(dof, dof);
+    u = arm_.rest_rad;
+    for (int round = 0; round < 60; ++round) {
+      imbalance(u, input, residual);
+      for (Eigen::Index j = 0; j < dof; ++j) {
+        moved = u;
+        moved[j] += 1e-6;
+        imbalance(moved, input, shifted);
+        jacobian.col(j) = (shifted - residual) / 1e-6;
+      }
+      Eigen::VectorXd step = jacobian.partialPivLu().solve(residual);
+      if (!step.allFinite()) return false;
+      const double length = step.norm();
+      if (length > 0.5) step *= 0.5 / length;
+      u -= step;
+      if (length < 1e-12) return true;
+    }
+    return false;
+  }
+
+  /// One step of length h; inputs at its begin, middle and end.
+  bool step(double h, const Eigen::VectorXd& p0, const Eigen::VectorXd& p1,
+            const Eigen::VectorXd& p2, Eigen::VectorXd& u, Eigen::VectorXd& v) {
+    if (!arm_.inertia) return creep(h, p0, p1, p2, u);
+    if (!acceleration(u, v, p0, a1_)) return false;
+    u2_ = u + 0.5 * h * v;
+    v2_ = v + 0.5 * h * a1_;
+    if (!acceleration(u2_, v2_, p1, a2_)) return false;
+    u3_ = u + 0.5 * h * v2_;
+    v3_ = v + 0.5 * h * a2_;
+    if (!acceleration(u3_, v3_, p1, a3_)) return false;
+    u4_ = u + h * v3_;
+    v4_ = v + h * a3_;
+    if (!acceleration(u4_, v4_, p2, a4_)) return false;
+    u += h / 6.0 * (v + 2.0 * v2_ + 2.0 * v3_ + v4_);
+    v += h / 6.0 * (a1_ + 2.0 * a2_ + 2.0 * a3_ + a4_);
+    return u.allFinite() && u.cwiseAbs().maxCoeff() < kLargest_rad;
+  }
+
+  /// The same without inertia.
+  bool creep(double h, const Eigen::VectorXd& p0, const Eigen::VectorXd& p1,
+             const Eigen::VectorXd& p2, Eigen::VectorXd& u) {
+    velocity(u, p0, a1_);
+    u2_ = u + 0.5 * h * a1_;
+    velocity(u2_, p1, a2_);
+    u3_ = u + 0.5 * h * a2_;
+    velocity(u3_, p1, a3_);
+    u4_ = u + h * a3_;
+    velocity(u4_, p2, a4_);
+    u += h / 6.0 * (a1_ + 2.0 * a2_ + 2.0 * a3_ + a4_);
+    return u.allFinite() && u.cwiseAbs().maxCoeff() < kLargest_rad;
+  }
+
+  void velocity(const Eigen::VectorXd& u, const Eigen::VectorXd& input, Eigen::VectorXd& v) {
+    imbalance(u, input, v);
+    for (Eigen::Index c = 0; c < v.size(); ++c)
+      v[c] /= -arm_.arm.segments[static_cast<std::size_t>(c / 2)].damping_nms_per_rad;
+  }
+
+  void reserve(Eigen::Index dof) {
+    for (Eigen::VectorXd* each : {&a1_, &a2_, &a3_, &a4_}) each->setZero(dof);
+  }
+
+ private:
+  const ArmHypothesis& arm_;
+  ArmParameters plain_;
+  DynamicsWorkspace workspace_;
+  Eigen::VectorXd force_, spring_;
+  Eigen::VectorXd a1_, a2_, a3_, a4_, u2_, u3_, u4_, v2_, v3_, v4_;
+};
+
+}  // namespace
+
+ArmHypothesis believed(const Experiment& experiment) {
+  ArmHypothesis out = hypothesis(experiment.arm, experiment.actuation);
+  const IdentificationSettings& extra = experiment.identification;
+  for (std::size_t c = 0; c < extra.rest_u_rad.size(); ++c)
+    out.rest_rad[static_cast<Eigen::Index>(c)] = extra.rest_u_rad[c];
+  out.cubic_nm_per_rad3 = extra.cubic_nm_per_rad3;
+  out.lag_s = extra.lag_s;
+  out.delay_s = extra.delay_s;
+  return out;
+}
+
+ArmHypothesis of_plant(const Experiment& experiment) {
+  ArmHypothesis out = hypothesis(experiment.plant.arm, experiment.plant.actuation);
+  out.lag_s = experiment.plant.valves.lag_s;
+  out.delay_s = experiment.plant.valves.dead_time_s;
+  return out;
+}
+
+void push_force(const ArmHypothesis& arm, ConstVectorRef u, const Eigen::VectorXd& input,
+                VectorRef force) {
+  force.setZero();
+  for (Eigen::Index j = 0; j < arm.push.cols(); ++j)
+    force.segment<2>(2 * arm.segment_of[static_cast<std::size_t>(j)]) += input[j] * arm.push.col(j);
+  if (arm.arm.actuation == ActuationModel::chamber) return;
+  for (Eigen::Index i = 0; i < arm.arm.size(); ++i) {
+    const Eigen::Vector2d f = force.segment<2>(2 * i);  // = A_chamber tau_A
+    force.segment<2>(2 * i) =
+        actuation_matrix(arm.arm.actuation, u.segment<2>(2 * i)) * Eigen::Vector2d(-f.y(), f.x());
+  }
+}
+
+void spring_force(const ArmHypothesis& arm, ConstVectorRef u, VectorRef force) {
+  for (Eigen::Index i = 0; i < arm.arm.size(); ++i) {
+    const Eigen::Vector2d bend = u.segment<2>(2 * i) - arm.rest_rad.segment<2>(2 * i);
+    force.segment<2>(2 * i) = (arm.arm.segments[static_cast<std::size_t>(i)].stiffness_nm_per_rad +
+                               arm.cubic_nm_per_rad3 * bend.squaredNorm()) *
+                              bend;
+  }
+}
+
+double ResponseModel::fastest_1ps(const ArmHypothesis& arm) const {
+  const Eigen::Index dof = arm.arm.dof();
+  DynamicsWorkspace workspace(arm.arm);
+  double bend_rad = 0.0;  // where the cubic springs are stiffest
+  if (arm.cubic_nm_per_rad3 > 0.0)
+    for (Eigen::Index i = 0; i < record_.u_rad.cols() / 2; ++i)
+      bend_rad = std::max(bend_rad, record_.u_rad.middleCols<2>(2 * i).rowwise().norm().maxCoeff());
+  Eigen::VectorXd damping(dof), springs(dof);
+  for (Eigen::Index c = 0; c < dof; ++c) {
+    const SegmentParameters& segment = arm.arm.segments[static_cast<std::size_t>(c / 2)];
+    damping[c] = segment.damping_nms_per_rad;
+    springs[c] = segment.stiffness_nm_per_rad + 3.0 * arm.cubic_nm_per_rad3 * bend_rad * bend_rad;
+  }
+  const Eigen::VectorXd straight = Eigen::VectorXd::Zero(dof);
+  if (!arm.inertia) {
+    Eigen::MatrixXd stiffness = springs.asDiagonal();
+    Eigen::VectorXd moved = straight, weight(dof);
+    for (Eigen::Index j = 0; j < dof; ++j) {
+      moved[j] = 1e-4;
+      inverse_dynamics(arm.arm, workspace, moved, moved, moved, moved,
+                       {.inertia = false, .coriolis = false, .gravity = true}, weight);
+      stiffness.col(j) += weight / 1e-4;
+      moved[j] = 0.0;
+    }
+    const double largest = stiffness.cwiseAbs().rowwise().sum().maxCoeff();  // >= any eigenvalue
+    return damping.minCoeff() > 0.0 ? largest / damping.minCoeff()
+                                    : std::numeric_limits<double>::infinity();
+  }
+  Eigen::MatrixXd B(dof, dof);
+  inertia_matrix(arm.arm, workspace, straight, B);
+  const double smallest =
+      Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(B, Eigen::EigenvaluesOnly).eigenvalues()[0];
+  const Eigen::MatrixXd impedance = damping.asDiagonal();
+  const double damped = Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd>(
+                            impedance, B, Eigen::EigenvaluesOnly)
+                            .eigenvalues()[dof - 1];
+  return std::max(damped, std::sqrt(springs.maxCoeff() / smallest));
+}
+
+std::optional<double> ResponseModel::step_s(const ArmHypothesis& arm) const {
+  const double rate = fastest_1ps(arm);
+  if (!(rate < kFastest_1ps)) return std::nullopt;
+  return kStep / rate;
+}
+
+double ResponseModel::longest_step_s(const ArmHypothesis& arm) const {
+  if (const std::optional<double> step = step_s(arm)) return *step;
+  throw std::runtime_error(fmt::format(
+      "the fastest mode of the arm is at {:.3g} 1/s: its response cannot be simulated in "
+      "reasonable time; arm.mass_model: distributed has slower modes, --linear needs none",
+      fastest_1ps(arm)));
+}
+
+bool ResponseModel::simulate(const ArmHypothesis& arm, double longest_step_s,
+                             Eigen::MatrixXd& u) const {
+  const Eigen::Index frames = record_.time_s.size(), dof = arm.arm.dof();
+  u.resize(frames, dof);
+  LaggedInput input(record_.input, arm.lag_s, arm.delay_s);
+  Motion motion(arm);
+  motion.reserve(dof);
+  Eigen::VectorXd p0(arm.push.cols()), p1 = p0, p2 = p0, now(dof), v = Eigen::VectorXd::Zero(dof);
+  input.at(record_.time_s[0], p0);
+  if (!motion.settle(p0, now)) return false;
+  u.row(0) = now;
+  for (Eigen::Index k = 1; k < frames; ++k) {
+    const double from_s = record_.time_s[k - 1], span_s = record_.time_s[k] - from_s;
+    const int steps = std::max(1, static_cast<int>(std::ceil(span_s / longest_step_s - 1e-9)));
+    const double h = span_s / steps;
+    for (int j = 0; j < steps; ++j) {
+      input.at(from_s + (j + 0.5) * h, p1);
+      const double to_s = j + 1 == steps ? record_.time_s[k] : from_s + (j + 1) * h;
+      input.at(to_s, p2, true);
+      if (!motion.step(h, p0, p1, p2, now, v)) return false;
+      input.at(to_s, p0);
+    }
+    u.row(k) = now;
+  }
+  return true;
+}
+
+}  // namespace softarm

@@ -1,0 +1,43 @@
+// ARKODE's one-step methods on a second-order system in residual form.
+#pragma once
+
+#include <sundials/sundials_nonlinearsolver.h>
+
+#include "simulation/integrator.hpp"
+#include "simulation/stage_solver.hpp"
+
+namespace softarm {
+
+/// Diagonally implicit Runge-Kutta methods and, for systems that are not stiff, an explicit one.
+///
+/// One-step methods forget nothing at a change of the input, so a command every millisecond costs
+/// no restart. Of the diagonally implicit ones only those without an explicit first stage are used:
+/// they never evaluate x'' = B^-1 (...) at the old input. The stages are solved by StageSolver
+/// through the residual.
+class ArkodeIntegrator final : public Integrator {
+ public:
+  /// @param system outlives the integrator.
+  /// @throw std::invalid_argument for tolerances that are not positive and finite.
+  ArkodeIntegrator(SecondOrderSystem& system, const IntegratorSettings& settings);
+  ~ArkodeIntegrator() override;
+
+  IntegratorCounters counters() const override;
+
+ private:
+  int evolve(double t_end_s, double* reached_s) override;
+  void restart(double t_s, double first_step_s) override;
+  std::string flag_name(int flag) const override;
+  void set_method();
+
+  static int derivative(double t_s, N_Vector y, N_Vector y_dot, void* self);
+  static int solve_stage(SUNNonlinearSolver solver, N_Vector y, N_Vector correction,
+                         N_Vector weights, double tolerance, int, void*);
+  static void keep_message(int, const char*, const char*, char* text, void* self);
+
+  StageSolver stages_;
+  SUNNonlinearSolver solver_ = nullptr;
+  void* arkode_ = nullptr;
+  Eigen::VectorXd s_, acceleration_;
+};
+
+}  // namespace softarm
