@@ -38,7 +38,6 @@ class LockStep {
   ControlPipeline pipeline_;
   SimulatedArm arm_;
   std::vector<MocapFrame> frames_;
-  std::vector<double> pressures_;
   PressureVector measured_;
   std::int64_t ticks_ = 0;
   DurationHistogram tick_times_;
