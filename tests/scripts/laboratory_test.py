@@ -1,4 +1,4 @@
-"""Every command of docs/laboratory.md, as printed, in one shell, against the simulated arm. Argument: folder of the programs."""
+"""Every command of docs/tutorial/laboratory.md, as printed, in one shell, against the simulated arm. Argument: folder of the programs."""
 import os
 import pathlib
 import re
@@ -11,7 +11,7 @@ import unittest
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 PROGRAMS = pathlib.Path(sys.argv.pop(1))
 PATIENCE_S = 300
-PAGE = ROOT / "docs/laboratory.md"
+PAGE = ROOT / "docs/tutorial/laboratory.md"
 
 if subprocess.run([ROOT / "tools/with_loopback_network", "true"], capture_output=True, check=False).returncode != 0:
     print("skipped: no network of our own can be made here, and there is no multicast route")
