@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Lets the first segment's end go round in a slow circle, by references sent over LCM, and tells how well it follows.
+"""Moves the end of the first segment in a slow circle, by references sent over LCM, and prints how well it follows.
 
 Needs a softarmd whose reference is `live` (config/one_segment_live.yaml), and the Python of tools/python_environment.
 """
@@ -14,7 +14,7 @@ from softarm_messages import controller_status_t, curvature_reference_t
 MODES = ("INIT", "WAIT_FRAMES", "ACTIVE", "HOLD", "VENT", "FAULT")
 ACTIVE = MODES.index("ACTIVE")
 RATE_HZ = 100.0
-RISE_S = 2.0  # a circle is entered and left slowly: a reference that jumps is refused
+RISE_S = 2.0  # enter and leave the circle slowly: a reference that jumps is refused
 
 
 def ramp(t):
@@ -25,7 +25,7 @@ def ramp(t):
 
 
 def circle(t, duration, bend_rad, rate_radps):
-    """u = theta (cos phi, sin phi) of a segment that is bent by theta and turns with phi = rate t, with two derivatives."""
+    """u = theta (cos phi, sin phi) of a segment with bend theta and phi = rate t, with two derivatives."""
     rising = t < duration / 2
     r, dr, ddr = (bend_rad * x for x in ramp(t if rising else duration - t))
     dr = dr if rising else -dr
@@ -41,14 +41,14 @@ class Follower:
         self.status = None
         self.statuses = 0
         self.squares = []
-        self.sequence = time.time_ns()  # counts up from one run to the next, too
+        self.sequence = time.time_ns()  # also counts up from one run to the next
         node.subscribe(channels.status, self.take_status)
 
     def take_status(self, _channel, data):
         self.status = controller_status_t.decode(data)
         self.statuses += 1
         if self.status.mode == ACTIVE:
-            # The reference the daemon followed in this tick, beside what the cameras saw.
+            # The reference that the daemon followed in this tick, and what the cameras saw.
             self.squares += [(a - b) ** 2 for a, b in zip(self.status.u_rad[0], self.status.reference_u_rad[0])]
 
     def handle_until(self, end):
@@ -67,7 +67,7 @@ class Follower:
         self.sequence += 1
         message.sequence = self.sequence
         message.dimension = 2 * segments
-        straight = [0.0] * (2 * segments - 2)  # all segments behind the first
+        straight = [0.0] * (2 * segments - 2)  # all segments after the first
         message.u_rad, message.velocity_radps, message.acceleration_radps2 = (list(part) + straight for part in parts)
         self.node.publish(self.reference_channel, message.encode())
 
@@ -91,13 +91,13 @@ def main():
         return 1
     start = time.monotonic()
     follower.squares.clear()
-    told = 0.0
+    printed_s = 0.0
     for tick in range(int(options.duration * RATE_HZ) + 1):
         t = tick / RATE_HZ
         follower.handle_until(start + t)
         follower.send(circle(t, options.duration, options.bend, options.rate))
-        if t - told >= 1.0:
-            told = t
+        if t - printed_s >= 1.0:
+            printed_s = t
             print(f"{t:5.1f} s  {MODES[follower.status.mode]:<11} theta {follower.status.theta_rad[0]:.3f} rad  "
                   f"phi {follower.status.phi_rad[0]:+.3f} rad  frame age {1e3 * follower.status.frame_age_s:.1f} ms", flush=True)
     if not follower.squares:

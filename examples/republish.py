@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""Publishes our motion-capture frames anew in another laboratory's messages: what a driver of OptiTrack or Vicon would send.
+"""Publishes our motion-capture frames again as the messages that a driver of OptiTrack or Vicon would send.
 
-Sends optitrack_frame_t (y up, x y z w, plates beside the axis) as config/paper_arm_optitrack.yaml describes it, or
+Sends optitrack_frame_t (y up, x y z w, marker frames beside the axis) as config/paper_arm_optitrack.yaml describes it, or
 rigid_transform_t as config/paper_arm_vicon.yaml does. Needs the Python of tools/python_environment.
 """
 import argparse
@@ -12,12 +12,12 @@ import time
 import lcm
 from softarm_messages import mocap_frame_t, optitrack_frame_t, optitrack_rigid_body_t, rigid_transform_t
 
-# On every body, where S_i sits: position in m, and angle in rad about an axis. As in config/paper_arm_optitrack.yaml.
-PLATES = (((0.008, 0, 0), 0, (0, 0, 1)), ((0.008, 0, 0), 0, (0, 0, 1)), ((0.008, 0, 0), math.pi / 2, (0, 0, 1)),
+# The frame S_i on every body: position in m, and angle in rad about an axis. As in config/paper_arm_optitrack.yaml.
+MARKER_FRAMES = (((0.008, 0, 0), 0, (0, 0, 1)), ((0.008, 0, 0), 0, (0, 0, 1)), ((0.008, 0, 0), math.pi / 2, (0, 0, 1)),
           ((0, -0.008, 0), 0.02, (1, 0, 0)))
 FIRST_ID = 100
 NAMES = ("base", "segment_1", "segment_2", "segment_3")
-Y_UP = ((1, 0, 0), (0, 0, 1), (0, -1, 0))  # what is our x, y, z is their x, z, -y
+Y_UP = ((1, 0, 0), (0, 0, 1), (0, -1, 0))  # our x, y, z are their x, z, -y
 
 
 def product(a, b):
@@ -61,9 +61,9 @@ def quaternion(r):
     return tuple(scale * x for x in rows[k])
 
 
-def plate_pose(body, plate, world):
-    """Pose of the plate in the other system's world, from that of S_i in ours: position, (w, x, y, z)."""
-    offset, angle, axis = plate
+def body_pose(body, marker_frame, world):
+    """Pose of the tracked body in the other system's world, from that of S_i in ours: position, (w, x, y, z)."""
+    offset, angle, axis = marker_frame
     rotation = product(matrix(*body.orientation), transposed(about(axis, angle)))
     position = tuple(p - d for p, d in zip(body.position_m, apply(rotation, offset)))
     return apply(world, position), quaternion(product(world, rotation))
@@ -74,10 +74,10 @@ def optitrack_frame(frame):
     out.utime = time.time_ns() // 1000
     out.frame = frame.frame_number
     out.timestamp = 1e-6 * frame.capture_time_us
-    for body, plate in zip(frame.bodies, PLATES):
+    for body, marker_frame in zip(frame.bodies, MARKER_FRAMES):
         rigid = optitrack_rigid_body_t()
         rigid.id = FIRST_ID + body.id
-        rigid.xyz, (w, x, y, z) = plate_pose(body, plate, Y_UP)
+        rigid.xyz, (w, x, y, z) = body_pose(body, marker_frame, Y_UP)
         rigid.quat = (x, y, z, w)
         rigid.params = 1 if body.valid else 0
         out.rigid_bodies.append(rigid)
