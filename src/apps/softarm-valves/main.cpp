@@ -331,7 +331,7 @@ int serve(const std::string& path) {
       valves.port, valves.rate_hz));
   if (valves.host != "127.0.0.1")
     say("softarm-valves: warning: these registers were not tried on hardware; see "
-        "docs/valves.md\n");
+        "docs/how-to/connect_valves.md\n");
   ServiceNotifier service;
   if (!service.problem().empty())
     say(fmt::format("softarm-valves: warning: {}\n", service.problem()));
