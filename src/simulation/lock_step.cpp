@@ -23,7 +23,7 @@ bool LockStep::step(LogRow& row, bool logged) {
   TickInput input;
   input.now_ns = now_ns;
   input.frames = frames_;
-  input.newest_go_ns = now_ns;  // nobody has to hold a button while nothing moves
+  operator_.attend(pipeline_.output(), input);
   measured_ = arm_.measured_pressures_bar().cast<float>().cast<double>();  // as valves publish them
   input.newest_measurement_ns = now_ns;
   input.measured_bar = &measured_;

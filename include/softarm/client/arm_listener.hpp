@@ -57,7 +57,6 @@ class ArmListener {
   static constexpr std::int64_t kNever = INT64_MIN;
 
  private:
-  std::int64_t arrival_ns(const ReceivedMessage& packet) const;
   void take_packet(std::size_t channel, const ReceivedMessage& packet);
   void take_frame(std::int64_t arrival_ns);
   void note_ids(std::span<const std::byte> bytes);
