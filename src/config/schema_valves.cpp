@@ -56,7 +56,7 @@ void describe_registers(SchemaVisitor& visitor, RegisterMap& map) {
                  map.timeout_least_s);
 }
 
-void describe_doubts(SchemaVisitor& visitor, ValveDriverSettings& valves) {
+void describe_stuck_valves(SchemaVisitor& visitor, ValveDriverSettings& valves) {
   visitor.number({"stuck_bar", "bar", "a pressure further from its set point than this ...",
                   above_to(0.0, 100.0)},
                  valves.stuck_bar);
@@ -108,7 +108,7 @@ void describe_valves(SchemaVisitor& visitor, ValveDriverSettings& valves, int ch
                   "set in the terminal and read back: it vents when we fall silent for so long",
                   above_to(0.0, 10.0)},
                  valves.failsafe_timeout_s);
-  describe_doubts(visitor, valves);
+  describe_stuck_valves(visitor, valves);
 }
 
 }  // namespace softarm

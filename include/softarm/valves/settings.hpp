@@ -1,4 +1,4 @@
-// What an experiment says about the valve terminal: where it is, its registers, when to doubt it.
+// What an experiment says about the valve terminal: where it is, its registers, what counts as a fault.
 #pragma once
 
 #include <array>

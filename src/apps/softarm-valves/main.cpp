@@ -154,9 +154,9 @@ class ValveLoop {
     const ValveCounters& counters = guard_.counters();
     say(fmt::format(
         "softarm-valves: {} cycles, {} missed; {} connections, {} lost, {} late answers, {} "
-        "exception replies, {} doubts; {} commands refused\n",
+        "exception replies, {} times degraded; {} commands refused\n",
         counters.cycles, late_cycles_, counters.connections, counters.broken, counters.no_answers,
-        counters.exceptions, counters.doubts, refused_));
+        counters.exceptions, counters.times_degraded, refused_));
   }
 
  private:
@@ -251,7 +251,7 @@ class ValveLoop {
     message.exceptions = static_cast<std::int32_t>(counters.exceptions);
     message.no_answers = static_cast<std::int32_t>(counters.no_answers);
     message.broken = static_cast<std::int32_t>(counters.broken);
-    message.doubts = static_cast<std::int32_t>(counters.doubts);
+    message.doubts = static_cast<std::int32_t>(counters.times_degraded);
     message.late_cycles = static_cast<std::int32_t>(late_cycles_);
     message.commands_refused = static_cast<std::int32_t>(refused_);
     message.actual_bar = measurement_message_.pressure_bar;
