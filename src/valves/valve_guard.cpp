@@ -230,9 +230,8 @@ void ValveGuard::exchanged(LinkResult result, const ReadBack& read_back,
   if (failures_ > 0) since_ns_ = now_ns;
   failures_ = 0;
   const bool zero = set_points_bar_.maxCoeff() <= 0.0;
-  const double unit_bar = 1.0 / settings_.driver.registers.units_per_bar;
-  zero_confirmed_ =
-      zero && (!read_back.has_echo || read_back.echo_bar.cwiseAbs().maxCoeff() <= unit_bar);
+  zero_confirmed_ = zero && (!read_back.has_echo ||
+                             read_back.echo_bar.cwiseAbs().maxCoeff() <= read_back.resolution_bar);
 
   int chamber = -1;
   ValveReason wrong = fault(read_back, chamber);

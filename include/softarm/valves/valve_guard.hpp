@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "softarm/actuation/command_expiry.hpp"
-#include "softarm/valves/register_map.hpp"
 #include "softarm/valves/settings.hpp"
+#include "softarm/valves/valve_backend.hpp"
 
 namespace softarm {
 
@@ -39,9 +39,6 @@ enum class ValveReason : std::int8_t {
   shutdown
 };
 const char* name(ValveReason reason) noexcept;
-
-/// How a request to the terminal ended.
-enum class LinkResult { ok, no_answer, exception_reply, broken };
 
 /// What the driver does next.
 enum class ValveAction {

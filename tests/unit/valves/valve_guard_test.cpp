@@ -21,7 +21,6 @@ class Guard : public ::testing::Test {
   void SetUp() override { make(); }
   void make() {
     settings.chambers = 2;
-    settings.driver.registers = register_preset(TerminalKind::cpx_vppm);
     guard = std::make_unique<ValveGuard>(settings);
   }
 
