@@ -8,20 +8,11 @@
 #include "config/reader.hpp"
 #include "config/writer.hpp"
 #include "config/yaml_tree.hpp"
+#include "softarm/base/hash.hpp"
 #include "softarm/valves/register_map.hpp"
 
 namespace softarm {
 namespace {
-
-/// FNV-1a, 64 bits.
-std::uint64_t fnv1a(const std::string& text) {
-  std::uint64_t hash = 14695981039346656037ull;
-  for (const char c : text) {
-    hash ^= static_cast<unsigned char>(c);
-    hash *= 1099511628211ull;
-  }
-  return hash;
-}
 
 std::string print(const Experiment& experiment, Documentation documentation) {
   ExperimentWriter writer(documentation);
