@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "softarm/base/time.hpp"
 #include "softarm/runtime/settings.hpp"
 
 namespace softarm {
@@ -98,20 +99,12 @@ constexpr auto kRules = [] {
   return rules;
 }();
 
-/// now - then without overflow where `then` is never.
-std::int64_t age(std::int64_t now_ns, std::int64_t then_ns) noexcept {
-  return then_ns == SafetyInput::kNever ? std::numeric_limits<std::int64_t>::max()
-                                        : now_ns - then_ns;
-}
-
 /// The values named may come off the wire.
 template <class Enumeration, std::size_t count>
 const char* name_of(Enumeration value, const std::array<const char*, count>& names) noexcept {
   const auto index = static_cast<std::size_t>(value);
   return index < count ? names[index] : "unknown";
 }
-
-std::int64_t to_ns(double time_s) noexcept { return std::llround(time_s * 1e9); }
 
 }  // namespace
 
@@ -188,13 +181,13 @@ CauseRule SafetyMonitor::worst_cause(const SafetyInput& input) const noexcept {
       .settings = settings_,
       .thresholds = thresholds_,
       .mode = mode_,
-      .frame_age_ns = age(input.now_ns, input.newest_capture_ns),
+      .frame_age_ns = age_ns(input.now_ns, input.newest_capture_ns),
       .tick_gap_ns = ticked_before ? input.now_ns - previous_tick_ns_ : 0,
       .measurement_age_ns =
-          input.newest_measurement_ns == SafetyInput::kNever
-              ? std::numeric_limits<std::int64_t>::max()
+          input.newest_measurement_ns == kNever
+              ? kForever
               : input.now_ns - std::max(input.newest_measurement_ns, listening_since_ns_),
-      .go_age_ns = age(input.now_ns, input.newest_go_ns)};
+      .go_age_ns = age_ns(input.now_ns, input.newest_go_ns)};
   for (const Cause& cause : kCauses)
     if (cause.present(evidence)) return cause.rule;
   return {Reason::none, Mode::active, Clearance::good_frames};
