@@ -132,11 +132,8 @@ void describe_kind(SchemaVisitor& visitor, PlantSettings& plant) {
     visitor.integer({"links_per_segment", "", "each with two crossed revolute joints at its start",
                      from_to(1, kMaxLinksPerSegment)},
                     links.links_per_segment);
-    static const std::array<const char*, 2> kJoints = {"crossed", "polar"};
-    visitor.choice({"joints", "",
-                    "crossed: two angles about x and y; polar: the paper's phi and theta, singular "
-                    "where straight, for comparison only"},
-                   kJoints, links.joints);
+    static const std::array<const char*, 1> kJoints = {"crossed"};
+    visitor.choice({"joints", "", "crossed: two angles, about x and y"}, kJoints, links.joints);
     visitor.optional_number(
         {"joint_stiffness_nm_per_rad", "N m/rad",
          "of every joint about each axis; left out: k times links_per_segment", from_to(0.0, 1e6)},
@@ -207,11 +204,11 @@ void describe_plant(SchemaVisitor& visitor, Experiment& experiment) {
     plant.initial_u_rad = Eigen::Map<const Eigen::VectorXd>(u.data(), 2 * n);
   });
   describe_world(visitor, plant);
-  static const std::array<const char*, 7> kMethods = {"sdirk2",    "cash4",       "sdirk4", "erk",
-                                                      "cvode_bdf", "cvode_adams", "ida"};
+  static const std::array<const char*, 5> kMethods = {"sdirk2", "cash4", "sdirk4", "erk",
+                                                      "cvode_bdf"};
   visitor.choice({"integrator", "",
                   "method of SUNDIALS: one-step and implicit (sdirk2, cash4, sdirk4) or explicit "
-                  "(erk), multistep (the others)"},
+                  "(erk), multistep (cvode_bdf)"},
                  kMethods, plant.method);
   if (visitor.reading() && plant.method != IntegratorMethod::sdirk2) {
     // Whoever chooses another method wants its accuracy.
