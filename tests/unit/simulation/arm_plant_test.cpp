@@ -25,7 +25,7 @@ VectorXd bent() {
   return u;
 }
 
-/// G + K u - force at rest, from the model room.
+/// G + K u - force at rest, from the module model.
 VectorXd static_residual(const ArmParameters& arm, const VectorXd& u, const VectorXd& force) {
   DynamicsWorkspace workspace(arm);
   VectorXd out(arm.dof());
