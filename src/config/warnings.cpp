@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "softarm/actuation/pressure_allocator.hpp"
+#include "softarm/base/time.hpp"
 #include "softarm/config/load.hpp"
 #include "softarm/control/gain_check.hpp"
 #include "softarm/control/reference.hpp"
@@ -123,7 +124,7 @@ std::vector<std::string> experiment_warnings(const Experiment& experiment) {
       resolve_thresholds(experiment.safety, 1.0 / experiment.rate_hz);
   const MocapSettings& mocap = experiment.plant.mocap;
   const double oldest_s = mocap.latency_s + 1.0 / mocap.rate_hz;
-  const double hold_s = 1e-9 * static_cast<double>(thresholds.hold_after_ns);
+  const double hold_s = to_seconds(thresholds.hold_after_ns);
   if (oldest_s > hold_s) {
     warnings.push_back(fmt::format(
         "plant.mocap: its frames get {:.3g} s old, daemon.safety holds after {:.3g} s: the "

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "softarm/base/time.hpp"
 #include "softarm/model/actuation_matrix.hpp"
 #include "softarm/runtime/settings.hpp"
 
@@ -10,7 +11,7 @@ namespace softarm {
 
 PressureWatch::PressureWatch(const SafetySettings& settings, int chambers) noexcept
     : tolerance_bar_(settings.pressure_tolerance_bar),
-      settling_ns_(std::llround(1e9 * settings.pressure_settling_s)) {
+      settling_ns_(to_ns(settings.pressure_settling_s)) {
   for (PressureVector* bound : {&now_.low, &now_.high, &before_.low, &before_.high})
     bound->setZero(chambers);
 }
@@ -42,7 +43,7 @@ void PressureWatch::reset() noexcept { known_ = in_row_ = 0; }
 
 CurvatureWatch::CurvatureWatch(const SafetySettings& settings, const ArmParameters& arm)
     : limit_nm_(settings.curvature_residual_nm),
-      settling_ns_(std::llround(1e9 * settings.curvature_settling_s)),
+      settling_ns_(to_ns(settings.curvature_settling_s)),
       arm_(arm),
       workspace_(arm) {
   for (SegmentVector* v : {&at_rest_, &force_, &actuated_}) v->setZero(arm.dof());

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "softarm/base/clock.hpp"
+#include "softarm/base/time.hpp"
 #include "softarm/runtime/settings.hpp"
 #include "softarm/transport/message_decoding.hpp"
 #include "softarm/transport/settings.hpp"
@@ -15,15 +17,8 @@ namespace {
 /// What may arrive between two ticks; more is dropped by LCM and counted as missing.
 constexpr int kFrameCapacity = TickRecorder::kMostFrames;
 constexpr int kOtherCapacity = 16;
-constexpr auto kNever = std::numeric_limits<std::int64_t>::min();
 /// After so long a silence a sender of references or requests may begin its numbers anew.
 constexpr std::int64_t kNumberForgotten_ns = 500'000'000;
-
-std::int64_t wall_clock_ns() noexcept {
-  timespec now{};
-  clock_gettime(CLOCK_REALTIME, &now);
-  return std::int64_t{now.tv_sec} * 1'000'000'000 + now.tv_nsec;
-}
 
 }  // namespace
 
@@ -67,7 +62,7 @@ DaemonLink::DaemonLink(const PipelineSettings& settings, const TransportSettings
 TickInput DaemonLink::collect(std::int64_t now_ns) noexcept {
   previous_collect_ns_ = now_ns_;
   now_ns_ = now_ns;
-  wall_minus_monotonic_ns_ = wall_clock_ns() - now_ns;
+  wall_minus_monotonic_ns_ = wall_now_ns() - now_ns;
   frame_count_ = 0;
   input_ = {};
   input_.now_ns = now_ns;

@@ -13,6 +13,7 @@
 #include "apps/signals.hpp"
 #include "softarm/base/clock.hpp"
 #include "softarm/base/instance_lock.hpp"
+#include "softarm/base/time.hpp"
 #include "softarm/base/version.hpp"
 #include "softarm/config/load.hpp"
 #include "softarm/simulation/simulated_arm.hpp"
@@ -44,10 +45,9 @@ class PlantProcess {
         node_(lcm_.url),
         // Registers hold until the terminal's own time-out, and for ever without one.
         arm_(experiment.plant, monotonic_now_ns(),
-             modbus_port ? CommandExpiry::kNever
-                         : std::llround(1e9 * experiment.safety.command_validity_s)),
+             modbus_port ? kForever : to_ns(experiment.safety.command_validity_s)),
         by_torque_(experiment.plant.actuation.kind == ActuationKind::torque),
-        report_period_ns_(static_cast<std::int64_t>(1e9 / experiment.plant.mocap.rate_hz)) {
+        report_period_ns_(to_ns(1.0 / experiment.plant.mocap.rate_hz)) {
     if (modbus_port) {
       modbus_ = std::make_unique<ModbusSide>(experiment.valves, *modbus_port);
       say(fmt::format("softarm-plant: valve terminal at 127.0.0.1 port {}\n",
@@ -104,8 +104,7 @@ class PlantProcess {
     const Eigen::VectorXd& bar = terminal.set_points_bar();
     const double timeout_s = terminal.timeout_s();
     arm_.command({.sequence = modbus_->sequence++,
-                  .validity_ns = timeout_s > 0.0 ? static_cast<std::int64_t>(1e9 * timeout_s)
-                                                 : CommandExpiry::kNever,
+                  .validity_ns = timeout_s > 0.0 ? to_ns(timeout_s) : kForever,
                   .pressure_bar = {bar.data(), static_cast<std::size_t>(bar.size())}},
                  arm_now_ns());
   }
@@ -117,7 +116,7 @@ class PlantProcess {
     if (excess_ns <= 0) return now_ns;
     lost_ns_ += excess_ns;
     say(fmt::format("softarm-plant: {:.3f} s behind real time; the arm stood still meanwhile\n",
-                    1e-9 * static_cast<double>(excess_ns)));
+                    to_seconds(excess_ns)));
     return now_ns - excess_ns;
   }
 

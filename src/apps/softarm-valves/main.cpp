@@ -16,6 +16,7 @@
 #include "softarm/base/line_log.hpp"
 #include "softarm/base/realtime.hpp"
 #include "softarm/base/service_notifier.hpp"
+#include "softarm/base/time.hpp"
 #include "softarm/base/version.hpp"
 #include "softarm/config/load.hpp"
 #include "softarm/runtime/settings.hpp"
@@ -121,7 +122,7 @@ class ValveLoop {
   /// Until a stop was requested and zero was confirmed, or cannot be; says which.
   bool run() {
     const std::int64_t start_ns = monotonic_now_ns();
-    PeriodicDeadline deadline(static_cast<std::int64_t>(1e9 / settings_.rate_hz), start_ns);
+    PeriodicDeadline deadline(to_ns(1.0 / settings_.rate_hz), start_ns);
     std::int64_t stop_ns = 0;
     while (true) {
       // Commands are taken as they come, so that their validity counts from their arrival.
@@ -260,7 +261,7 @@ class ValveLoop {
 
   void report(std::int64_t since_start_ns) noexcept {
     if (!changed_) return;
-    const double t_s = 1e-9 * static_cast<double>(since_start_ns);
+    const double t_s = to_seconds(since_start_ns);
     const ValveReason reason = guard_.reason();
     const char* opening = reason == ValveReason::none ? "" : " (";
     const char* closing = reason == ValveReason::none ? "" : ")";

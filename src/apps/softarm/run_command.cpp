@@ -11,6 +11,7 @@
 #include "apps/softarm/commands.hpp"
 #include "apps/softarm/plots.hpp"
 #include "softarm/base/clock.hpp"
+#include "softarm/base/time.hpp"
 #include "softarm/config/load.hpp"
 #include "softarm/recording/experiment_log.hpp"
 #include "softarm/recording/logged_run.hpp"
@@ -74,8 +75,7 @@ int run(const RunOptions& options) {
     const std::int64_t took_ns =
         record(stepper, duration_s, period_s, ticks_a_row, log, shapes, summary);
     log.close();
-    timing.real_time_factor =
-        1e9 * summary.duration_s() / static_cast<double>(std::max<std::int64_t>(1, took_ns));
+    timing.real_time_factor = summary.duration_s() / to_seconds(std::max<std::int64_t>(1, took_ns));
     timing.histograms = {{"tick_us", stepper.tick_times().counts(), stepper.tick_times().max_us()}};
   };
   std::unique_ptr<LoggedRun> logged;

@@ -12,6 +12,7 @@
 #include "integration/processes/process.hpp"
 #include "integration/valves/relay.hpp"
 #include "softarm/base/clock.hpp"
+#include "softarm/base/time.hpp"
 #include "softarm/transport/lcm_node.hpp"
 #include "softarm/transport/message_decoding.hpp"
 #include "softarm/valves/valve_guard.hpp"
@@ -79,7 +80,7 @@ class ValvesProgram : public ::testing::Test {
 
   /// Handles messages, and commands `bar` in every chamber (unless negative), until `reached`.
   bool wait_for(const std::function<bool()>& reached, double bar = -1.0, double patience_s = 20.0) {
-    const std::int64_t end_ns = monotonic_now_ns() + static_cast<std::int64_t>(patience_s * 1e9);
+    const std::int64_t end_ns = monotonic_now_ns() + to_ns(patience_s);
     while (monotonic_now_ns() < end_ns) {
       if (reached()) return true;
       if (bar >= 0.0) send(bar);
