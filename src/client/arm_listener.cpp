@@ -60,14 +60,9 @@ ArmListener::ArmListener(const Experiment& experiment, LcmNode& node, bool keep)
   });
 }
 
-// Not the time at which we look: what else we do must not count as jitter.
-std::int64_t ArmListener::arrival_ns(const ReceivedMessage& packet) const {
-  return std::min(monotonic_now_ns(), 1000 * packet.arrival_utime_us - seen_.wall_minus_ns);
-}
-
 // Called from LCM: nothing may be thrown through it. Storage grows, which is all it can fail at.
 void ArmListener::take_packet(std::size_t channel, const ReceivedMessage& packet) {
-  const std::int64_t now_ns = arrival_ns(packet);
+  const std::int64_t now_ns = packet.arrival_ns;  // what else we do must not count as jitter
   if (keep_) {
     note_ids(packet.bytes);
     in_other_order_.take(channel, packet.bytes, now_ns, other_frame_);
@@ -118,7 +113,7 @@ void ArmListener::take_pressures(const ReceivedMessage& packet) {
   if (!decode(packet.bytes, measurement_message_)) return;
   measured_bar_.assign(measurement_message_.pressure_bar.begin(),
                        measurement_message_.pressure_bar.end());
-  if (keep_) seen_.pressures.push_back({arrival_ns(packet), measured_bar_});
+  if (keep_) seen_.pressures.push_back({packet.arrival_ns, measured_bar_});
 }
 
 double ArmListener::largest_theta_rad() const {

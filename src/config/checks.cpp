@@ -268,9 +268,6 @@ class Checks {
     const ValveDriverSettings& valves = experiment_.valves;
     // Arms that have no terminal need not fit into one.
     if (experiment_.actuation.kind == ActuationKind::torque || !reader_.given("valves")) return;
-    in_addr address{};
-    require(inet_pton(AF_INET, valves.host.c_str(), &address) == 1, "valves.host",
-            "an IPv4 address", "\"" + valves.host + "\"");
     std::set<int> seen;
     for (const int valve : valves.order) {
       require(seen.insert(valve).second, "valves.order", "every valve once",
@@ -284,18 +281,26 @@ class Checks {
             fmt::format("at least backoff_s ({} s)", valves.backoff_s),
             fmt::format("{} s", valves.longest_backoff_s));
     const double silent_s = (valves.tolerated_failures + 1) * period_s;
-    const double least_s = std::max(valves.registers.timeout_least_s, silent_s);
-    require(valves.failsafe_timeout_s >= least_s, "valves.failsafe_timeout_s",
-            fmt::format("at least {:.6g} s (what the terminal takes, and tolerated_failures + 1 "
-                        "periods)",
-                        least_s),
+    require(valves.failsafe_timeout_s >= silent_s, "valves.failsafe_timeout_s",
+            fmt::format("at least {:.6g} s (tolerated_failures + 1 periods)", silent_s),
             fmt::format("{} s", valves.failsafe_timeout_s));
-    const double units = valves.failsafe_timeout_s / valves.registers.timeout_unit_s;
-    require(units >= 0.5 && units < (valves.registers.timeout_words == 2 ? 4294967295.0 : 65535.0),
+    if (valves.backend == "modbus") check_terminal(valves);
+  }
+
+  void check_terminal(const ValveDriverSettings& valves) const {
+    in_addr address{};
+    require(inet_pton(AF_INET, valves.host.c_str(), &address) == 1, "valves.host",
+            "an IPv4 address", "\"" + valves.host + "\"");
+    const RegisterMap& map = valves.registers;
+    require(valves.failsafe_timeout_s >= map.timeout_least_s, "valves.failsafe_timeout_s",
+            fmt::format("at least {:.6g} s, what the terminal takes", map.timeout_least_s),
+            fmt::format("{} s", valves.failsafe_timeout_s));
+    const double units = valves.failsafe_timeout_s / map.timeout_unit_s;
+    require(units >= 0.5 && units < (map.timeout_words == 2 ? 4294967295.0 : 65535.0),
             "valves.failsafe_timeout_s", "a time-out that fits its register",
             fmt::format("{:.6g} units", units));
     const std::string fault =
-        register_map_fault(valves.registers, valves.order, experiment_.actuation.max_pressure_bar);
+        register_map_fault(map, valves.order, experiment_.actuation.max_pressure_bar);
     require(fault.empty(), "valves.registers", "registers that fit together", fault);
   }
 

@@ -56,7 +56,7 @@ void describe_registers(SchemaVisitor& visitor, RegisterMap& map) {
                  map.timeout_least_s);
 }
 
-void describe_doubts(SchemaVisitor& visitor, ValveDriverSettings& valves) {
+void describe_stuck_valves(SchemaVisitor& visitor, ValveDriverSettings& valves) {
   visitor.number({"stuck_bar", "bar", "a pressure further from its set point than this ...",
                   above_to(0.0, 100.0)},
                  valves.stuck_bar);
@@ -70,6 +70,11 @@ void describe_doubts(SchemaVisitor& visitor, ValveDriverSettings& valves) {
 }  // namespace
 
 void describe_valves(SchemaVisitor& visitor, ValveDriverSettings& valves, int chambers) {
+  visitor.text({"backend", "", "who drives the valves: modbus, or one of a program of your own",
+                from_to(1, 63)},
+               valves.backend);
+  visitor.text({"device", "", "what a back end opens that is not on a network", from_to(0, 255)},
+               valves.device);
   visitor.text({"host", "", "IPv4 address of the terminal", from_to(7, 15)}, valves.host);
   visitor.integer({"port", "", "of Modbus TCP", from_to(1, 65535)}, valves.port);
   visitor.integer({"unit_id", "", "of the terminal behind the port", from_to(0, 255)},
@@ -108,7 +113,7 @@ void describe_valves(SchemaVisitor& visitor, ValveDriverSettings& valves, int ch
                   "set in the terminal and read back: it vents when we fall silent for so long",
                   above_to(0.0, 10.0)},
                  valves.failsafe_timeout_s);
-  describe_doubts(visitor, valves);
+  describe_stuck_valves(visitor, valves);
 }
 
 }  // namespace softarm

@@ -58,6 +58,8 @@ bool LoggedRun::step(LogRow& row, bool logged) {
   TickInput input;
   input.now_ns = now_ns;
   input.frames = frames_;
+  input.newest_measurement_ns = now_ns;  // of valves that are not there
+  operator_.attend(pipeline_.output(), input);
   const std::int64_t before_ns = monotonic_now_ns();
   pipeline_.tick(input);
   tick_times_.add_ns(monotonic_now_ns() - before_ns);

@@ -10,8 +10,8 @@
 namespace softarm {
 namespace {
 
-/// So long after a stop of the daemon what arrives may have been sent before its end: it queues in
-/// the kernel, and is stamped as it leaves that.
+/// So long after a stop of the daemon what is handled may have been sent before its end: it queues
+/// in the kernel.
 constexpr std::int64_t kStale_ns = 500'000'000;
 
 /// Everything a cause may look at.

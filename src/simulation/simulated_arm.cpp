@@ -59,6 +59,16 @@ CommandVerdict SimulatedArm::command(const PressureCommand& command, std::int64_
   return verdict;
 }
 
+CommandVerdict SimulatedArm::command(const PressureVector& pressure_bar, std::int64_t validity_ns,
+                                     std::int64_t arrival_ns) {
+  advance_to(arrival_ns);
+  const std::span<const double> pressures(pressure_bar.data(),
+                                          static_cast<std::size_t>(pressure_bar.size()));
+  return command(
+      {.sequence = sequence() + 1, .validity_ns = validity_ns, .pressure_bar = pressures},
+      arrival_ns);
+}
+
 std::int64_t SimulatedArm::next_event_ns() const noexcept {
   return std::min({mocap_.next_capture_ns(), mocap_.next_arrival_ns(), expiry_.expires_ns()});
 }

@@ -1,7 +1,5 @@
 #include "softarm/transport/daemon_link.hpp"
 
-#include <time.h>
-
 #include <algorithm>
 #include <cmath>
 
@@ -60,9 +58,7 @@ DaemonLink::DaemonLink(const PipelineSettings& settings, const TransportSettings
 }
 
 TickInput DaemonLink::collect(std::int64_t now_ns) noexcept {
-  previous_collect_ns_ = now_ns_;
   now_ns_ = now_ns;
-  wall_minus_monotonic_ns_ = wall_now_ns() - now_ns;
   frame_count_ = 0;
   input_ = {};
   input_.now_ns = now_ns;
@@ -76,11 +72,9 @@ TickInput DaemonLink::collect(std::int64_t now_ns) noexcept {
   return input_;
 }
 
-/// LCM stamps arrivals with the wall clock. Brought to ours they can only lie between the last
-/// collection and now: so a wall clock that is set meanwhile does no harm.
+/// What comes in while the queue is emptied belongs to this tick as well.
 std::int64_t DaemonLink::arrival_ns(const ReceivedMessage& packet) const noexcept {
-  const std::int64_t arrival = packet.arrival_utime_us * 1000 - wall_minus_monotonic_ns_;
-  return std::clamp(arrival, previous_collect_ns_, now_ns_);
+  return std::min(packet.arrival_ns, now_ns_);
 }
 
 void DaemonLink::take_frame(std::size_t channel, const ReceivedMessage& packet) noexcept {

@@ -18,7 +18,7 @@ constexpr int kStartCycles = 3;
 
 const char* name(ValveState state) noexcept {
   constexpr const char* kNames[] = {"DISCONNECTED", "SECURING", "STARTING",
-                                    "VENTED",       "RUNNING",  "DOUBT"};
+                                    "VENTED",       "RUNNING",  "DEGRADED"};
   return kNames[static_cast<int>(state)];
 }
 
@@ -65,7 +65,7 @@ void ValveGuard::enter(ValveState state, ValveReason reason) noexcept {
 }
 
 void ValveGuard::disconnect(ValveReason reason, std::int64_t now_ns) noexcept {
-  if (settings_.wait_for_zero && (state_ == ValveState::running || state_ == ValveState::doubt))
+  if (settings_.wait_for_zero && (state_ == ValveState::running || state_ == ValveState::degraded))
     wait_for_zero();
   if (reason == ValveReason::failsafe_refused) backoff_ns_ = longest_backoff_ns_;
   next_attempt_ns_ = now_ns + backoff_ns_;
@@ -73,13 +73,13 @@ void ValveGuard::disconnect(ValveReason reason, std::int64_t now_ns) noexcept {
   enter(ValveState::disconnected, reason);
 }
 
-void ValveGuard::doubt(ValveReason reason, int chamber) noexcept {
+void ValveGuard::degrade(ValveReason reason, int chamber) noexcept {
   // A stuck valve would be found only by raising the pressure once more: someone has to look first.
   if (settings_.wait_for_zero || reason == ValveReason::stuck_valve) wait_for_zero();
-  if (state_ != ValveState::doubt) ++counters_.doubts;
+  if (state_ != ValveState::degraded) ++counters_.times_degraded;
   good_cycles_ = 0;
   chamber_ = chamber;
-  enter(ValveState::doubt, reason);
+  enter(ValveState::degraded, reason);
 }
 
 bool ValveGuard::wake(std::int64_t now_ns) noexcept {
@@ -87,9 +87,9 @@ bool ValveGuard::wake(std::int64_t now_ns) noexcept {
   // However the time went by since the terminal answered last, it has vented by itself.
   gap |= state_ == ValveState::running && now_ns - answered_ns_ >= failsafe_ns_;
   woken_ns_ = now_ns;
-  // Without a connection there is nothing to doubt, and connecting itself takes time.
+  // Without a connection no pressure is there to lose, and connecting itself takes time.
   if (gap && (state_ == ValveState::running || state_ == ValveState::vented))
-    doubt(ValveReason::time_gap, -1);
+    degrade(ValveReason::time_gap, -1);
   return !gap;
 }
 
@@ -188,7 +188,7 @@ void ValveGuard::failed(LinkResult result, std::int64_t now_ns) noexcept {
   // time-out.
   if (now_ns - since_ns_ > kMostExceptions_ns)
     return disconnect(ValveReason::exception_reply, now_ns);
-  doubt(ValveReason::exception_reply, -1);
+  degrade(ValveReason::exception_reply, -1);
 }
 
 ValveReason ValveGuard::fault(const ReadBack& read_back, int& chamber) const noexcept {
@@ -226,9 +226,8 @@ void ValveGuard::exchanged(LinkResult result, const ReadBack& read_back,
   if (failures_ > 0) since_ns_ = now_ns;
   failures_ = 0;
   const bool zero = set_points_bar_.maxCoeff() <= 0.0;
-  const double unit_bar = 1.0 / settings_.driver.registers.units_per_bar;
-  zero_confirmed_ =
-      zero && (!read_back.has_echo || read_back.echo_bar.cwiseAbs().maxCoeff() <= unit_bar);
+  zero_confirmed_ = zero && (!read_back.has_echo ||
+                             read_back.echo_bar.cwiseAbs().maxCoeff() <= read_back.resolution_bar);
 
   int chamber = -1;
   ValveReason wrong = fault(read_back, chamber);
@@ -249,8 +248,8 @@ void ValveGuard::exchanged(LinkResult result, const ReadBack& read_back,
     }
     return;
   }
-  if (wrong != ValveReason::none) return doubt(wrong, chamber);
-  if (state_ != ValveState::doubt) {
+  if (wrong != ValveReason::none) return degrade(wrong, chamber);
+  if (state_ != ValveState::degraded) {
     chamber_ = stuck;  // where stuck valves are only reported
     return;
   }

@@ -14,6 +14,14 @@ std::int64_t wall_now_ns() noexcept;
 /// Processor time of this thread in ns.
 std::int64_t thread_cpu_ns() noexcept;
 
+/// The monotonic and the wall clock (CLOCK_REALTIME) at one instant, in ns.
+struct ClockPair {
+  std::int64_t monotonic_ns, wall_ns;
+};
+
+/// Reads both together: of a few attempts the one that was held up least between the readings.
+ClockPair read_clocks() noexcept;
+
 /// Sleeps until an absolute time of CLOCK_MONOTONIC; returns early when a signal arrives.
 void sleep_until_ns(std::int64_t deadline_ns) noexcept;
 

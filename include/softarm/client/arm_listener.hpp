@@ -56,7 +56,6 @@ class ArmListener {
   std::string daemon_text() const;
 
  private:
-  std::int64_t arrival_ns(const ReceivedMessage& packet) const;
   void take_packet(std::size_t channel, const ReceivedMessage& packet);
   void take_frame(std::int64_t arrival_ns);
   void note_ids(std::span<const std::byte> bytes);

@@ -82,8 +82,6 @@ class DaemonLink {
   LiveReferenceInput reference_;
   TickInput input_;
   std::int64_t now_ns_ = 0;
-  std::int64_t wall_minus_monotonic_ns_ = 0;
-  std::int64_t previous_collect_ns_ = 0;
   std::int64_t newest_measurement_ns_;
   std::int64_t newest_go_ns_;
   std::int64_t go_sequence_;

@@ -16,7 +16,7 @@
 #include "softarm/base/time.hpp"
 #include "softarm/base/version.hpp"
 #include "softarm/config/load.hpp"
-#include "softarm/transport/daemon_link.hpp"
+#include "softarm/transport/daemon_loop.hpp"
 #include "softarm/transport/lcm_node.hpp"
 #include "softarm/transport/settings.hpp"
 
@@ -91,100 +91,6 @@ class ModeLog {
   std::jthread thread_;
 };
 
-/// Keeps the deadline, and the account of how well it was kept.
-class DaemonLoop {
- public:
-  DaemonLoop(const Experiment& experiment, bool shadow, ModeLog& log, ServiceNotifier& service)
-      : pipeline_(experiment),
-        link_(experiment, experiment.transport,
-              {.version = fmt::format("{} {}", version_text(), commit_text()),
-               .configuration_hash = experiment.hash,
-               .seed = experiment.seed,
-               .build = build_text()},
-              shadow),
-        ticks_per_second_(static_cast<std::int64_t>(experiment.rate_hz)),
-        log_{.log = log},
-        service_(service) {}
-
-  /// Returns once a stop was requested and every pressure has been commanded to zero.
-  void run() {
-    // Without SCHED_FIFO, or where it was refused, overruns say nothing about the daemon.
-    judge_overruns_ = runs_under_fifo();
-    const std::int64_t start_ns = monotonic_now_ns();
-    PeriodicDeadline deadline(pipeline_.period_ns(), start_ns);
-    int vented_commands = 0;
-    while (vented_commands < kLastCommands) {
-      sleep_until_ns(deadline.next_ns());
-      const std::int64_t woken_ns = monotonic_now_ns();
-      if (woken_ns < deadline.next_ns()) continue;  // a signal cut the sleep short
-      timing_.lateness.add_ns(woken_ns - deadline.next_ns());
-      tick(woken_ns);
-      log_.changed(woken_ns - start_ns, pipeline_.output());
-      const std::int64_t missed = deadline.advance(monotonic_now_ns());
-      timing_.overruns += missed;
-      missed_in_row_ =
-          missed > 0 ? missed_in_row_ + static_cast<int>(std::min(missed, kManyMissed)) : 0;
-      log_.log.malformed(link_.malformed());
-      service_.report(woken_ns, {.state = name(pipeline_.output().mode),
-                                 .reason = name(pipeline_.output().reason),
-                                 .on_time = missed == 0,
-                                 .stopping = stop_requested != 0});
-      if (stop_requested != 0 && pipeline_.output().reason == Reason::shutdown &&
-          pipeline_.fully_vented())
-        ++vented_commands;
-    }
-    // What was sent only once, not all at once: a logger's queue is short.
-    while (link_.repeat_record()) sleep_until_ns(monotonic_now_ns() + kRepeatPause_ns);
-  }
-
-  const LoopTiming& timing() const { return timing_; }
-  const ControlPipeline& pipeline() const { return pipeline_; }
-  const DaemonLink& link() const { return link_; }
-
- private:
-  /// Zero commands sent before leaving: one may be lost on the wire.
-  static constexpr int kLastCommands = 3;
-  static constexpr std::int64_t kRepeatPause_ns = 500'000;
-  static constexpr std::int64_t kManyMissed = 1'000'000;  ///< more are no worse, and fit an int
-
-  void tick(std::int64_t woken_ns) noexcept {
-    TickInput input = link_.collect(woken_ns);
-    input.shutdown = stop_requested != 0;
-    input.consecutive_overruns = judge_overruns_ ? missed_in_row_ : 0;
-    const TickOutput& output = pipeline_.tick(input);
-    const std::int64_t decided_ns = monotonic_now_ns();
-    link_.publish_command(decided_ns, output);
-    ++timing_.ticks;
-    link_.publish_status(woken_ns, pipeline_, timing_);
-    link_.publish_record(input, output);
-    if (timing_.ticks % ticks_per_second_ == 0) link_.publish_timing(woken_ns, timing_);
-    timing_.tick.add_ns(decided_ns - woken_ns);
-    timing_.publish.add_ns(monotonic_now_ns() - decided_ns);
-    if (output.frame_age_s >= 0.0) timing_.frame_age.add_ns(to_ns(output.frame_age_s));
-  }
-
-  struct ModeWatch {
-    void changed(std::int64_t since_start_ns, const TickOutput& output) noexcept {
-      if (output.mode == mode && output.reason == reason) return;
-      mode = output.mode;
-      reason = output.reason;
-      log.add(since_start_ns, mode, reason);
-    }
-    ModeLog& log;
-    Mode mode = Mode::init;
-    Reason reason = Reason::none;
-  };
-
-  ControlPipeline pipeline_;
-  DaemonLink link_;
-  bool judge_overruns_ = false;
-  std::int64_t ticks_per_second_;
-  int missed_in_row_ = 0;
-  LoopTiming timing_;
-  ModeWatch log_;
-  ServiceNotifier& service_;
-};
-
 void print_summary(const DaemonLoop& loop) {
   const LoopTiming& timing = loop.timing();
   const auto line = [](const char* what, const DurationHistogram& histogram) {
@@ -203,6 +109,26 @@ void print_summary(const DaemonLoop& loop) {
       timing.ticks, timing.overruns, frames.accepted,
       frames.rejected() + loop.pipeline().late_frames(), frames.repeated, frames.missing,
       loop.link().malformed(), loop.link().unsent()));
+}
+
+/// Prints every change of mode or reason, and reports to the service manager.
+void run(DaemonLoop& loop, ModeLog& log, ServiceNotifier& service) {
+  Mode mode = Mode::init;
+  Reason reason = Reason::none;
+  loop.run([] { return stop_requested != 0; },
+           [&](const DaemonLoop::Report& report) {
+             const TickOutput& output = loop.pipeline().output();
+             if (output.mode != mode || output.reason != reason) {
+               mode = output.mode;
+               reason = output.reason;
+               log.add(report.since_start_ns, mode, reason);
+             }
+             log.malformed(loop.link().malformed());
+             service.report(report.woken_ns, {.state = name(mode),
+                                              .reason = name(reason),
+                                              .on_time = report.on_time,
+                                              .stopping = report.stopping});
+           });
 }
 
 int serve(const std::string& path, bool shadow) {
@@ -232,9 +158,14 @@ int serve(const std::string& path, bool shadow) {
   RealtimeSettings below_tick = realtime;
   below_tick.priority = std::max(1, below_tick.priority - 1);
   apply_realtime_settings(below_tick);
-  DaemonLoop loop(experiment, shadow, log, service);
+  DaemonLoop loop(experiment, experiment.transport,
+                  {.version = fmt::format("{} {}", version_text(), commit_text()),
+                   .configuration_hash = experiment.hash,
+                   .seed = experiment.seed,
+                   .build = build_text()},
+                  shadow);
   apply_realtime_settings(realtime);
-  loop.run();
+  run(loop, log, service);
   log.finish();
   print_summary(loop);
   return kExitOk;

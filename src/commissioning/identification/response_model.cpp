@@ -51,8 +51,8 @@ class Motion {
     for (SegmentParameters& segment : plain_.segments) segment.stiffness_nm_per_rad = 0.0;
   }
 
-  bool acceleration(const Eigen::VectorXd& u, const Eigen::VectorXd& v,
-                    const Eigen::VectorXd& input, Eigen::VectorXd& a) {
+  [[nodiscard]] bool acceleration(const Eigen::VectorXd& u, const Eigen::VectorXd& v,
+                                  const Eigen::VectorXd& input, Eigen::VectorXd& a) {
     push_force(arm_, u, input, force_);
     spring_force(arm_, u, spring_);
     force_ -= spring_;
@@ -75,8 +75,8 @@ class Motion {
   }
 
   /// One step of length h; inputs at its begin, middle and end.
-  bool step(double h, const Eigen::VectorXd& p0, const Eigen::VectorXd& p1,
-            const Eigen::VectorXd& p2, Eigen::VectorXd& u, Eigen::VectorXd& v) {
+  [[nodiscard]] bool step(double h, const Eigen::VectorXd& p0, const Eigen::VectorXd& p1,
+                          const Eigen::VectorXd& p2, Eigen::VectorXd& u, Eigen::VectorXd& v) {
     if (!arm_.inertia) return creep(h, p0, p1, p2, u);
     if (!acceleration(u, v, p0, a1_)) return false;
     u2_ = u + 0.5 * h * v;
@@ -94,8 +94,8 @@ class Motion {
   }
 
   /// The same without inertia.
-  bool creep(double h, const Eigen::VectorXd& p0, const Eigen::VectorXd& p1,
-             const Eigen::VectorXd& p2, Eigen::VectorXd& u) {
+  [[nodiscard]] bool creep(double h, const Eigen::VectorXd& p0, const Eigen::VectorXd& p1,
+                           const Eigen::VectorXd& p2, Eigen::VectorXd& u) {
     velocity(u, p0, a1_);
     u2_ = u + 0.5 * h * a1_;
     velocity(u2_, p1, a2_);

@@ -40,7 +40,7 @@ std::string common_cause(const Responses& responses, std::string& cure) {
     return std::all_of(responses.begin(), responses.end(), holds);
   };
   if (all([](const PulseResponse& each) { return each.silent(); })) {
-    cure = "open the air supply; is the valve driver running, and not in DOUBT?";
+    cure = "open the air supply; is the valve driver running, and not DEGRADED?";
     return "no chamber moves the arm";
   }
   if (!all([](const PulseResponse& each) { return !each.silent() && !each.astray(); })) return "";

@@ -216,7 +216,7 @@ TEST_F(ValvesBehindARelay, ExceptionRepliesVentAndAreSurvived) {
   begin();
   ASSERT_TRUE(run_at(0.3)) << driver_->printed();
   relay_->exceptions = true;
-  ASSERT_TRUE(wait_for([&] { return is(ValveState::doubt, ValveReason::exception_reply); }, 0.3))
+  ASSERT_TRUE(wait_for([&] { return is(ValveState::degraded, ValveReason::exception_reply); }, 0.3))
       << driver_->printed();
   ASSERT_TRUE(wait_for([&] { return plant_.pressure_bar[0] < 0.02F; }, 0.3));
   EXPECT_GT(status_.exceptions, 2);
@@ -244,7 +244,7 @@ TEST_F(ValvesBehindARelay, AStuckValveIsReportedAndVents) {
   ASSERT_TRUE(run_at(0.3)) << driver_->printed();
   relay_->stuck_at = 900;
   relay_->stuck_word = 3 * 5;  // measured pressure of the sixth valve
-  ASSERT_TRUE(wait_for([&] { return is(ValveState::doubt, ValveReason::stuck_valve); }, 0.3))
+  ASSERT_TRUE(wait_for([&] { return is(ValveState::degraded, ValveReason::stuck_valve); }, 0.3))
       << driver_->printed();
   EXPECT_EQ(status_.chamber, 5);
   EXPECT_TRUE(wait_for([&] { return plant_.pressure_bar[0] < 0.02F; }, 0.3));
@@ -277,7 +277,7 @@ TEST_F(ValvesBehindARelay, AStoppedAndContinuedDriverVents) {
   driver_->signal(SIGSTOP);
   ASSERT_TRUE(wait_for([&] { return plant_.vented != 0; }, 0.3)) << "the terminal's own time-out";
   driver_->signal(SIGCONT);
-  EXPECT_TRUE(wait_for([&] { return is(ValveState::doubt, ValveReason::time_gap); }, 0.3))
+  EXPECT_TRUE(wait_for([&] { return is(ValveState::degraded, ValveReason::time_gap); }, 0.3))
       << driver_->printed();
   expect_recovery();
 }
@@ -382,7 +382,7 @@ class ValvesAtPymodbus : public ValvesProgram {
   std::unique_ptr<Process> terminal_, driver_;
 };
 
-TEST_F(ValvesAtPymodbus, AForeignTerminalIsSecuredDrivenDoubtedAndVented) {
+TEST_F(ValvesAtPymodbus, AForeignTerminalIsSecuredDrivenDegradedAndVented) {
   begin();
   ASSERT_TRUE(wait_for(
       [&] {
@@ -396,7 +396,7 @@ TEST_F(ValvesAtPymodbus, AForeignTerminalIsSecuredDrivenDoubtedAndVented) {
   EXPECT_EQ(there.negative, 0);
   EXPECT_EQ(there.timeout_ms, 300);
   order("diagnosis 4 8");
-  ASSERT_TRUE(wait_for([&] { return is(ValveState::doubt, ValveReason::diagnosis); }, 0.7))
+  ASSERT_TRUE(wait_for([&] { return is(ValveState::degraded, ValveReason::diagnosis); }, 0.7))
       << driver_->printed();
   EXPECT_EQ(status_.chamber, 4);
   ASSERT_TRUE(wait_for([&] { return state_of_terminal().now == 0; }));
