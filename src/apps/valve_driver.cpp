@@ -14,6 +14,7 @@
 #include "softarm/base/line_log.hpp"
 #include "softarm/base/realtime.hpp"
 #include "softarm/base/service_notifier.hpp"
+#include "softarm/base/time.hpp"
 #include "softarm/base/version.hpp"
 #include "softarm/config/load.hpp"
 #include "softarm/transport/valves_loop.hpp"
@@ -56,8 +57,7 @@ bool drive(const char* program, const Experiment& experiment, ValveDriver& drive
       loop.run([] { return stop_requested != 0; },
                [&](const ValvesLoop::Report& report) {
                  if (report.changed)
-                   log.add("{:.3f} s: {}", 1e-9 * static_cast<double>(report.since_start_ns),
-                           driver.text(text));
+                   log.add("{:.3f} s: {}", to_seconds(report.since_start_ns), driver.text(text));
                  service.report(report.now_ns, {.state = name(driver.guard().state()),
                                                 .reason = name(driver.guard().reason()),
                                                 .on_time = report.on_time,

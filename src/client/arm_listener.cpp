@@ -6,6 +6,7 @@
 #include <chrono>
 
 #include "softarm/base/clock.hpp"
+#include "softarm/base/time.hpp"
 #include "softarm/runtime/safety_monitor.hpp"
 #include "softarm/transport/message_decoding.hpp"
 #include "softarm/transport/settings.hpp"
@@ -16,12 +17,6 @@ namespace {
 constexpr int kQueue = 1024;
 constexpr std::int64_t kSpeedSpan_ns = 50'000'000;  ///< so far apart, noise is no speed
 constexpr std::int64_t kStatusCounts_ns = 1'000'000'000;
-
-std::int64_t wall_now_ns() {
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(
-             std::chrono::system_clock::now().time_since_epoch())
-      .count();
-}
 
 TransportSettings with_other_order(TransportSettings transport) {
   transport.mocap.quaternion = transport.mocap.quaternion == QuaternionOrder::wxyz
@@ -130,14 +125,13 @@ double ArmListener::largest_theta_rad() const {
 
 double ArmListener::fastest_radps() const {
   if (recent_.size() < 2) return 0.0;
-  const double span_s =
-      1e-9 * static_cast<double>(recent_.back().arrival_ns - recent_.front().arrival_ns);
+  const double span_s = to_seconds(recent_.back().arrival_ns - recent_.front().arrival_ns);
   const Eigen::VectorXd moved_rad = recent_.back().u_rad - recent_.front().u_rad;
   double fastest_rad = 0.0;
   for (Eigen::Index k = 0; k + 1 < moved_rad.size(); k += 2)
     fastest_rad = std::max(fastest_rad, moved_rad.segment<2>(k).norm());
   // Frames that a stall delivers all at once are no motion.
-  return span_s > 1e-9 * static_cast<double>(kSpeedSpan_ns) / 2.0 ? fastest_rad / span_s : 0.0;
+  return span_s > to_seconds(kSpeedSpan_ns) / 2.0 ? fastest_rad / span_s : 0.0;
 }
 
 bool ArmListener::daemon_armed(std::int64_t now_ns) const {

@@ -87,10 +87,9 @@ static void describe_world(Keys& key, PlantSettings& it) {
 }
 
 static void describe_integrator(Keys& key, PlantSettings& it) {
-  key("integrator", it.method,
-      one_of({"sdirk2", "cash4", "sdirk4", "erk", "cvode_bdf"}),
+  key("integrator", it.method, one_of({"sdirk2", "cash4", "sdirk4", "erk", "cvode_bdf"}),
       "method of SUNDIALS: one-step and implicit (sdirk2, cash4, sdirk4) or explicit (erk), "
-      "multistep (the others)");
+      "multistep (cvode_bdf)");
   if (key.reading() && it.method != IntegratorMethod::sdirk2) {
     // Whoever chooses another method wants its accuracy.
     it.relative_tolerance = 1e-6;

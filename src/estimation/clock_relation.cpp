@@ -6,6 +6,8 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "softarm/base/time.hpp"
+
 namespace softarm {
 namespace {
 constexpr std::int64_t kBucketNs = 200'000'000;
@@ -18,7 +20,7 @@ std::int64_t modulo(std::int64_t value, std::int64_t divisor) noexcept {
 }  // namespace
 
 ClockRelation::ClockRelation(ClockMode mode, double latency_s)
-    : mode_(mode), latency_ns_(std::llround(latency_s * 1e9)) {
+    : mode_(mode), latency_ns_(to_ns(latency_s)) {
   if (!(latency_s >= 0.0) || !(latency_s < 1e6)) {
     throw std::invalid_argument(fmt::format("expected a latency >= 0 s, got {}", latency_s));
   }

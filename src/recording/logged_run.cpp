@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "softarm/base/clock.hpp"
+#include "softarm/base/time.hpp"
 #include "softarm/runtime/log_row.hpp"
 #include "softarm/simulation/lock_step.hpp"
 
@@ -64,7 +65,7 @@ bool LoggedRun::step(LogRow& row, bool logged) {
   tick_times_.add_ns(monotonic_now_ns() - before_ns);
   if (!logged) return true;
   fill_from_pipeline(pipeline_, experiment_.arm, row);
-  row.t_s = 1e-9 * static_cast<double>(now_ns - start_ns_);
+  row.t_s = to_seconds(now_ns - start_ns_);
   row.truth.resize(0);
   row.real.resize(0);
   row.tip.reset();

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "softarm/base/time.hpp"
 #include "softarm/runtime/settings.hpp"
 
 namespace softarm {
@@ -139,7 +140,7 @@ void ControlPipeline::validate_and_estimate(const TickInput& input, SafetyInput&
   output_.soft_limit = safety.soft_limit_exceeded;
   output_.frame_age_s = newest_capture_ns_ == kNever
                             ? std::numeric_limits<double>::quiet_NaN()
-                            : 1e-9 * static_cast<double>(input.now_ns - newest_capture_ns_);
+                            : to_seconds(input.now_ns - newest_capture_ns_);
 }
 
 void ControlPipeline::watch(const TickInput& input, SafetyInput& safety) noexcept {

@@ -237,7 +237,7 @@ Mode SafetyMonitor::step(const SafetyInput& input) noexcept {
   // A run of good frames is one without a cause, a rejection, a gap or silent valves, and begins
   // anew with the arm vented (until then it is moving), and when what queued up is through.
   const bool still_venting = mode_ >= Mode::vent && !input.fully_vented;
-  const bool unheard = settings_.valve_readback && listening_since_ns_ != SafetyInput::kNever &&
+  const bool unheard = settings_.valve_readback && listening_since_ns_ != kNever &&
                        input.newest_measurement_ns <= listening_since_ns_;
   const bool deaf = input.now_ns < deaf_until_ns_;
   if (worst.demands > Mode::active || input.bad_frames > 0 || still_venting || unheard || deaf) {

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "softarm/base/clock.hpp"
+#include "softarm/base/time.hpp"
 #include "softarm/runtime/settings.hpp"
 #include "softarm/transport/message_decoding.hpp"
 #include "softarm/transport/settings.hpp"

@@ -4,6 +4,7 @@
 
 #include "softarm/base/clock.hpp"
 #include "softarm/base/realtime.hpp"
+#include "softarm/base/time.hpp"
 
 namespace softarm {
 namespace {
@@ -63,8 +64,7 @@ void DaemonLoop::tick(std::int64_t woken_ns, bool stopping) noexcept {
   if (timing_.ticks % ticks_per_second_ == 0) link_.publish_timing(woken_ns, timing_);
   timing_.tick.add_ns(decided_ns - woken_ns);
   timing_.publish.add_ns(monotonic_now_ns() - decided_ns);
-  if (output.frame_age_s >= 0.0)
-    timing_.frame_age.add_ns(static_cast<std::int64_t>(1e9 * output.frame_age_s));
+  if (output.frame_age_s >= 0.0) timing_.frame_age.add_ns(to_ns(output.frame_age_s));
 }
 
 }  // namespace softarm

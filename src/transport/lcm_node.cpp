@@ -76,8 +76,7 @@ int LcmNode::drain(int limit) noexcept {
 
 bool LcmNode::wait_until(std::int64_t deadline_ns) noexcept {
   // lcm_handle_timeout counts in milliseconds, which is too coarse for a plant in real time.
-  const std::int64_t left_ns = std::max<std::int64_t>(0, deadline_ns - monotonic_now_ns());
-  const timespec timeout{.tv_sec = left_ns / 1'000'000'000, .tv_nsec = left_ns % 1'000'000'000};
+  const timespec timeout = time_left(deadline_ns);
   pollfd descriptor{.fd = lcm_get_fileno(lcm_), .events = POLLIN, .revents = 0};
   if (ppoll(&descriptor, 1, &timeout, nullptr) <= 0) return false;
   look_at_clocks();

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "softarm/base/time.hpp"
+
 namespace softarm {
 namespace {
 
@@ -11,10 +13,6 @@ constexpr std::int64_t kMostStarting_ns = 20'000'000'000;  // a VTEM loads its m
 constexpr std::int64_t kMostExceptions_ns = 1'000'000'000;
 constexpr double kGoodFor_s = 0.25;
 constexpr int kStartCycles = 3;
-
-std::int64_t to_ns(double seconds) {
-  return static_cast<std::int64_t>(std::llround(1e9 * seconds));
-}
 
 }  // namespace
 
@@ -55,7 +53,7 @@ ValveGuard::ValveGuard(const ValveGuardSettings& settings)
       backoff_ns_(first_backoff_ns_),
       must_see_zero_(settings.wait_for_zero),
       set_points_bar_(Eigen::VectorXd::Zero(settings.chambers)),
-      off_since_ns_(static_cast<std::size_t>(settings.chambers), kLongAgo) {}
+      off_since_ns_(static_cast<std::size_t>(settings.chambers), kNever) {}
 
 void ValveGuard::enter(ValveState state, ValveReason reason) noexcept {
   state_ = state;
@@ -85,7 +83,7 @@ void ValveGuard::degrade(ValveReason reason, int chamber) noexcept {
 }
 
 bool ValveGuard::wake(std::int64_t now_ns) noexcept {
-  bool gap = woken_ns_ != kLongAgo && now_ns - woken_ns_ > gap_ns_;
+  bool gap = woken_ns_ != kNever && now_ns - woken_ns_ > gap_ns_;
   // However the time went by since the terminal answered last, it has vented by itself.
   gap |= state_ == ValveState::running && now_ns - answered_ns_ >= failsafe_ns_;
   woken_ns_ = now_ns;
@@ -111,12 +109,12 @@ ValveAction ValveGuard::next(std::int64_t now_ns) noexcept {
 
 void ValveGuard::wait_for_zero() noexcept {
   must_see_zero_ = true;
-  listening_since_ns_ = kLongAgo;
+  listening_since_ns_ = kNever;
 }
 
 void ValveGuard::update_running(std::int64_t now_ns) noexcept {
   const bool commanded = !expiry_.vented();
-  if (listening_since_ns_ == kLongAgo) listening_since_ns_ = now_ns;
+  if (listening_since_ns_ == kNever) listening_since_ns_ = now_ns;
   // What we could not hear is no silence of the controller.
   const bool silent = !commanded && now_ns - listening_since_ns_ >= validity_ns_;
   if (silent || (commanded && expiry_.set_points_bar().maxCoeff() <= 0.0)) must_see_zero_ = false;
@@ -136,9 +134,7 @@ void ValveGuard::update_running(std::int64_t now_ns) noexcept {
 
 void ValveGuard::update_set_points(std::int64_t now_ns) noexcept {
   const double passed_s =
-      written_ns_ == kLongAgo
-          ? 0.0
-          : 1e-9 * static_cast<double>(std::min(now_ns - written_ns_, 2 * period_ns_));
+      written_ns_ == kNever ? 0.0 : to_seconds(std::min(now_ns - written_ns_, 2 * period_ns_));
   written_ns_ = now_ns;
   if (state_ != ValveState::running) return;
   const double rise_bar =
@@ -164,7 +160,7 @@ void ValveGuard::secured(LinkResult result, bool as_written, std::int64_t now_ns
   if (result == LinkResult::ok && as_written) {
     failures_ = 0;
     starting_since_ns_ = now_ns;
-    std::fill(off_since_ns_.begin(), off_since_ns_.end(), kLongAgo);
+    std::fill(off_since_ns_.begin(), off_since_ns_.end(), kNever);
     return enter(ValveState::starting, ValveReason::not_ready);
   }
   counters_.exceptions += result == LinkResult::exception_reply;
@@ -212,8 +208,8 @@ int ValveGuard::stuck_chamber(const ReadBack& read_back, std::int64_t now_ns) no
     if (read_back.has_echo)
       off_bar = std::max(off_bar, std::abs(read_back.echo_bar[at] - set_points_bar_[at]));
     if (off_bar <= settings_.driver.stuck_bar) {
-      off_since_ns_[i] = kLongAgo;
-    } else if (off_since_ns_[i] == kLongAgo) {
+      off_since_ns_[i] = kNever;
+    } else if (off_since_ns_[i] == kNever) {
       off_since_ns_[i] = now_ns;
     } else if (now_ns - off_since_ns_[i] > stuck_after_ns_ && stuck < 0) {
       stuck = static_cast<int>(i);
@@ -258,7 +254,7 @@ void ValveGuard::exchanged(LinkResult result, const ReadBack& read_back,
   }
   // A valve that was stuck has to follow again before it counts as good.
   const bool follows = std::all_of(off_since_ns_.begin(), off_since_ns_.end(),
-                                   [](std::int64_t since) { return since == kLongAgo; });
+                                   [](std::int64_t since) { return since == kNever; });
   good_cycles_ = follows || reason_ != ValveReason::stuck_valve ? good_cycles_ + 1 : 0;
   if (good_cycles_ < good_cycles_needed_) return;
   chamber_ = -1;

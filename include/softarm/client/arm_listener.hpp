@@ -9,6 +9,7 @@
 #include <softarm_messages/pressure_measurement_t.hpp>
 #include <string>
 
+#include "softarm/base/time.hpp"
 #include "softarm/client/observation.hpp"
 #include "softarm/config/experiment.hpp"
 #include "softarm/estimation/curvature_estimator.hpp"
@@ -53,8 +54,6 @@ class ArmListener {
   std::string beyond_limits(std::int64_t lost_ns) const;
   /// "ACTIVE (none)", or "not heard".
   std::string daemon_text() const;
-
-  static constexpr std::int64_t kNever = INT64_MIN;
 
  private:
   void take_packet(std::size_t channel, const ReceivedMessage& packet);

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "softarm/actuation/command_expiry.hpp"
+#include "softarm/base/time.hpp"
 #include "softarm/valves/settings.hpp"
 #include "softarm/valves/valve_backend.hpp"
 
@@ -111,8 +112,6 @@ class ValveGuard {
   const ValveCounters& counters() const noexcept { return counters_; }
 
  private:
-  static constexpr std::int64_t kLongAgo = INT64_MIN;
-
   void enter(ValveState state, ValveReason reason) noexcept;
   void disconnect(ValveReason reason, std::int64_t now_ns) noexcept;
   void degrade(ValveReason reason, int chamber) noexcept;
@@ -133,22 +132,22 @@ class ValveGuard {
   ValveState state_ = ValveState::disconnected;
   ValveReason reason_ = ValveReason::no_connection;
   int chamber_ = -1;
-  std::int64_t woken_ns_ = kLongAgo;
-  std::int64_t next_attempt_ns_ = kLongAgo;
+  std::int64_t woken_ns_ = kNever;
+  std::int64_t next_attempt_ns_ = kNever;
   std::int64_t backoff_ns_;
   std::int64_t starting_since_ns_ = 0;
   std::int64_t failing_since_ns_ = 0;  ///< the first of `failures_`
-  std::int64_t written_ns_ = kLongAgo;
-  std::int64_t listening_since_ns_ = kLongAgo;  ///< for commands of zero, or none
-  std::int64_t answered_ns_ = 0;                ///< the cycle of the newest exchange that went well
-  int failures_ = 0;                            ///< in a row
-  int good_cycles_ = 0;                         ///< in a row
+  std::int64_t written_ns_ = kNever;
+  std::int64_t listening_since_ns_ = kNever;  ///< for commands of zero, or none
+  std::int64_t answered_ns_ = 0;              ///< the cycle of the newest exchange that went well
+  int failures_ = 0;                          ///< in a row
+  int good_cycles_ = 0;                       ///< in a row
   bool must_see_zero_;
   bool rising_ = true;  ///< on the way from vented to what is commanded
   bool stopping_ = false;
   bool zero_confirmed_ = true;
   Eigen::VectorXd set_points_bar_;
-  std::vector<std::int64_t> off_since_ns_;  ///< kLongAgo while a chamber follows its set point
+  std::vector<std::int64_t> off_since_ns_;  ///< kNever while a chamber follows its set point
   ValveCounters counters_;
 };
 

@@ -10,6 +10,7 @@
 #include "apps/signals.hpp"
 #include "apps/softarm-plant/plant_process.hpp"
 #include "softarm/base/instance_lock.hpp"
+#include "softarm/base/time.hpp"
 #include "softarm/base/version.hpp"
 #include "softarm/config/load.hpp"
 #include "softarm/transport/lcm_node.hpp"

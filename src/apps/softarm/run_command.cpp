@@ -11,6 +11,7 @@
 #include "apps/softarm/commands.hpp"
 #include "apps/softarm/plots.hpp"
 #include "softarm/base/clock.hpp"
+#include "softarm/base/time.hpp"
 #include "softarm/config/load.hpp"
 #include "softarm/recording/experiment_log.hpp"
 #include "softarm/recording/logged_run.hpp"
@@ -93,8 +94,8 @@ int run(const RunOptions& options) {
     const Recorded recorded =
         record(stepper, duration_s, period_s, ticks_a_row, log, shapes, summary);
     log.close();
-    timing.real_time_factor = 1e9 * summary.duration_s() /
-                              static_cast<double>(std::max<std::int64_t>(1, recorded.took_ns));
+    timing.real_time_factor =
+        summary.duration_s() / to_seconds(std::max<std::int64_t>(1, recorded.took_ns));
     if (!recorded.was_active)
       failure = never_active(stepper.pipeline().output(), experiment, summary.duration_s());
     timing.histograms = {{"tick_us", stepper.tick_times().counts(), stepper.tick_times().max_us()}};

@@ -13,6 +13,7 @@
 #include "softarm/base/instance_lock.hpp"
 #include "softarm/base/realtime.hpp"
 #include "softarm/base/service_notifier.hpp"
+#include "softarm/base/time.hpp"
 #include "softarm/base/version.hpp"
 #include "softarm/config/load.hpp"
 #include "softarm/transport/daemon_loop.hpp"
@@ -72,9 +73,8 @@ class ModeLog {
       for (std::size_t tail = tail_.load(); tail != head_.load(std::memory_order_acquire);
            tail_.store(++tail)) {
         const Entry& entry = entries_[tail % kCapacity];
-        say(fmt::format("softarmd: {:.3f} s: {} ({})\n",
-                        1e-9 * static_cast<double>(entry.since_start_ns), name(entry.mode),
-                        name(entry.reason)));
+        say(fmt::format("softarmd: {:.3f} s: {} ({})\n", to_seconds(entry.since_start_ns),
+                        name(entry.mode), name(entry.reason)));
       }
       if (const auto lost = lost_.exchange(0); lost > 0)
         say(fmt::format("softarmd: {} mode changes came too fast to be printed\n", lost));

@@ -3,13 +3,13 @@
 #include <fmt/format.h>
 
 #include <Eigen/Eigenvalues>
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
 
 #include "softarm/model/actuation_matrix.hpp"
+#include "softarm/model/statics.hpp"
 
 namespace softarm {
 namespace {
@@ -63,32 +63,15 @@ class Motion {
   void imbalance(const Eigen::VectorXd& u, const Eigen::VectorXd& input, Eigen::VectorXd& out) {
     push_force(arm_, u, input, force_);
     spring_force(arm_, u, spring_);
-    inverse_dynamics(plain_, workspace_, u, u, u, u,
-                     {.inertia = false, .coriolis = false, .gravity = true}, out);
+    gravity_moments(plain_, workspace_, u, out);
     out += spring_ - force_;
   }
 
-  [[nodiscard]] bool settle(const Eigen::VectorXd& input, Eigen::VectorXd& u) {
-    const Eigen::Index dof = u.size();
-    Eigen::VectorXd residual(dof), moved(dof), shifted(dof);
-    Eigen::MatrixXd jacobian(dof, dof);
-    u = arm_.rest_rad;
-    for (int round = 0; round < 60; ++round) {
-      imbalance(u, input, residual);
-      for (Eigen::Index j = 0; j < dof; ++j) {
-        moved = u;
-        moved[j] += 1e-6;
-        imbalance(moved, input, shifted);
-        jacobian.col(j) = (shifted - residual) / 1e-6;
-      }
-      Eigen::VectorXd step = jacobian.partialPivLu().solve(residual);
-      if (!step.allFinite()) return false;
-      const double length = step.norm();
-      if (length > 0.5) step *= 0.5 / length;
-      u -= step;
-      if (length < 1e-12) return true;
-    }
-    return false;
+  /// The shape at rest under an input.
+  std::optional<Eigen::VectorXd> settled(const Eigen::VectorXd& input) {
+    return solve_balance(
+        [&](const Eigen::VectorXd& u, Eigen::VectorXd& left) { imbalance(u, input, left); },
+        arm_.rest_rad);
   }
 
   /// One step of length h; inputs at its begin, middle and end.
@@ -199,15 +182,8 @@ double ResponseModel::fastest_1ps(const ArmHypothesis& arm) const {
   }
   const Eigen::VectorXd straight = Eigen::VectorXd::Zero(dof);
   if (!arm.inertia) {
-    Eigen::MatrixXd stiffness = springs.asDiagonal();
-    Eigen::VectorXd moved = straight, weight(dof);
-    for (Eigen::Index j = 0; j < dof; ++j) {
-      moved[j] = 1e-4;
-      inverse_dynamics(arm.arm, workspace, moved, moved, moved, moved,
-                       {.inertia = false, .coriolis = false, .gravity = true}, weight);
-      stiffness.col(j) += weight / 1e-4;
-      moved[j] = 0.0;
-    }
+    Eigen::MatrixXd stiffness = gravity_slope(arm.arm, straight);
+    stiffness.diagonal() += springs;
     const double largest = stiffness.cwiseAbs().rowwise().sum().maxCoeff();  // >= any eigenvalue
     return damping.minCoeff() > 0.0 ? largest / damping.minCoeff()
                                     : std::numeric_limits<double>::infinity();
@@ -244,9 +220,11 @@ bool ResponseModel::simulate(const ArmHypothesis& arm, double longest_step_s,
   LaggedInput input(record_.input, arm.lag_s, arm.delay_s);
   Motion motion(arm);
   motion.reserve(dof);
-  Eigen::VectorXd p0(arm.push.cols()), p1 = p0, p2 = p0, now(dof), v = Eigen::VectorXd::Zero(dof);
+  Eigen::VectorXd p0(arm.push.cols()), p1 = p0, p2 = p0, v = Eigen::VectorXd::Zero(dof);
   input.at(record_.time_s[0], p0);
-  if (!motion.settle(p0, now)) return false;
+  const std::optional<Eigen::VectorXd> settled = motion.settled(p0);
+  if (!settled) return false;
+  Eigen::VectorXd now = *settled;
   u.row(0) = now;
   for (Eigen::Index k = 1; k < frames; ++k) {
     const double from_s = record_.time_s[k - 1], span_s = record_.time_s[k] - from_s;

@@ -1,6 +1,7 @@
 #include <algorithm>
 
-#include "softarm/commissioning/preflight/checks.hpp"
+#include "commissioning/preflight/geometry.hpp"
+#include "softarm/estimation/curvature_estimator.hpp"
 
 namespace softarm {
 
@@ -33,6 +34,21 @@ MeanPoses mean_poses(const Observation& seen, std::int64_t from_ns, std::int64_t
     out.seen[i] /= out.frames;
   }
   return out;
+}
+
+bool curvature_of(const Experiment& experiment, const MeanPoses& poses, Eigen::VectorXd& u_rad) {
+  const int n = experiment.arm.size();
+  const CurvatureEstimator estimator(experiment.estimation, experiment.arm,
+                                     body_noise(experiment.estimation, n));
+  u_rad.setZero(2 * n);
+  for (int i = 0; i < n; ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    if (!poses.body[k].valid || !poses.body[k + 1].valid) return false;
+    const SegmentCurvature one = estimator.segment(i, poses.body[k], poses.body[k + 1]);
+    if (!one.valid) return false;
+    u_rad.segment<2>(2 * i) = one.u_rad;
+  }
+  return true;
 }
 
 }  // namespace softarm

@@ -8,6 +8,8 @@
 #include <random>
 #include <vector>
 
+#include "softarm/base/time.hpp"
+
 namespace softarm {
 namespace {
 
@@ -26,8 +28,7 @@ struct Network {
   }
   std::int64_t arrival_ns(std::int64_t true_ns) {
     std::exponential_distribution<double> jitter(1.0 / jitter_s);
-    last_arrival_ns = std::max(
-        last_arrival_ns, true_ns + latency_ns + static_cast<std::int64_t>(1e9 * jitter(random)));
+    last_arrival_ns = std::max(last_arrival_ns, true_ns + latency_ns + to_ns(jitter(random)));
     return last_arrival_ns;
   }
 };
@@ -57,7 +58,7 @@ TEST(ClockRelation, AJumpOfTheSendersClockDoesNoHarm) {
     ClockRelation relation(ClockMode::sender, 5e-3);
     double worst_s = 0.0;
     for (std::int64_t k = 0; k < 4000; ++k) {
-      if (k == 2000) network.ahead_ns += std::llround(1e9 * jump_s);
+      if (k == 2000) network.ahead_ns += to_ns(jump_s);
       const std::int64_t captured = k * 5'000'000;
       const std::int64_t arrival = network.arrival_ns(captured);
       const std::int64_t told = relation.capture_ns(arrival, network.stamp_us(captured));

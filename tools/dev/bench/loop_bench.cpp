@@ -24,6 +24,7 @@
 #include "dev/child_process.hpp"
 #include "softarm/base/clock.hpp"
 #include "softarm/base/realtime.hpp"
+#include "softarm/base/time.hpp"
 #include "softarm/config/load.hpp"
 #include "softarm/model/kinematics.hpp"
 #include "softarm/runtime/safety_monitor.hpp"
@@ -68,7 +69,7 @@ class Scene {
   Scene(const LoopBenchOptions& options, LoopScene& result)
       : options_(options),
         result_(result),
-        period_ns_(std::llround(1e9 / options.rate_hz)),
+        period_ns_(to_ns(1.0 / options.rate_hz)),
         folder_(std::filesystem::temp_directory_path() /
                 fmt::format("softarm_bench_loop_{}", getpid())) {
     std::filesystem::create_directories(folder_);
@@ -190,7 +191,7 @@ void Scene::listen() {
 }
 
 bool Scene::wait_for(const std::function<bool()>& reached) {
-  const std::int64_t end_ns = monotonic_now_ns() + static_cast<std::int64_t>(1e9 * kPatience_s);
+  const std::int64_t end_ns = monotonic_now_ns() + to_ns(kPatience_s);
   while (!reached() && monotonic_now_ns() < end_ns) drive(0.05, [](const std::string&) {});
   return reached();
 }
@@ -198,7 +199,7 @@ bool Scene::wait_for(const std::function<bool()>& reached) {
 /// A frame to the daemon, a request to the echo, in turn, at random times.
 void Scene::drive(double seconds, const std::function<void(const std::string&)>& progress) {
   const std::int64_t start_ns = monotonic_now_ns();
-  const std::int64_t end_ns = start_ns + static_cast<std::int64_t>(1e9 * seconds);
+  const std::int64_t end_ns = start_ns + to_ns(seconds);
   std::uniform_int_distribution<std::int64_t> pause_ns(2'000'000, 4'000'000);
   for (std::int64_t next_ns = start_ns; next_ns < end_ns; next_ns += pause_ns(random_)) {
     while (monotonic_now_ns() < next_ns) node_->wait_until(next_ns);
@@ -212,8 +213,8 @@ void Scene::drive(double seconds, const std::function<void(const std::string&)>&
     sent_ns.push_back(now_ns);
     frame.capture_time_us = now_ns / 1000;
     node_->publish(to_echo ? kEchoRequest : experiment_.transport.lcm.mocap_channel, frame);
-    progress(fmt::format("{}: {:.0f} / {:.0f} s", result_.name,
-                         1e-9 * static_cast<double>(now_ns - start_ns), seconds));
+    progress(
+        fmt::format("{}: {:.0f} / {:.0f} s", result_.name, to_seconds(now_ns - start_ns), seconds));
   }
 }
 

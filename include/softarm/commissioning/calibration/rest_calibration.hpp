@@ -36,10 +36,6 @@ struct RestCalibration {
   std::vector<RestReading> after;
 };
 
-/// u at rest: K u + G(u) = 0, nearest to straight.
-/// @throws std::runtime_error where Newton's method finds none
-Eigen::VectorXd rest_shape(const ArmParameters& arm);
-
 /// With B_i the mean pose of body i and T_i(u) the pose of S_i in S_0:
 ///   plate_i = B_i^-1 S_0 T_i(u_rest).
 /// @param frames body poses, as with plates of zero; only those in which every body is seen count

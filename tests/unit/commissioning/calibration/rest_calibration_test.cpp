@@ -10,6 +10,7 @@
 #include "softarm/config/load.hpp"
 #include "softarm/model/dynamics.hpp"
 #include "softarm/model/kinematics.hpp"
+#include "softarm/model/statics.hpp"
 #include "softarm/transport/settings.hpp"
 
 namespace softarm {
@@ -57,7 +58,7 @@ class Calibration : public ::testing::Test {
     };
     std::vector<MocapFrame> out;
     for (int k = 0; k < frames; ++k) {
-      Eigen::VectorXd u = rest_shape(experiment.arm);
+      Eigen::VectorXd u = *rest_shape(experiment.arm, Eigen::VectorXd::Zero(6));
       u[0] += sway_rad * std::sin(2 * M_PI * 0.005 * k);
       std::vector<Eigen::Isometry3d> ends(3);
       forward_kinematics(arm, u, ends);
@@ -174,7 +175,7 @@ TEST_F(Calibration, AnArmThatGravityBendsReadsBent) {
   const Eigen::Matrix3d tilted = Eigen::AngleAxisd(0.4, Eigen::Vector3d::UnitY()) * base.linear();
   experiment.arm.base_rotation = tilted;
   base.linear() = tilted;
-  const Eigen::VectorXd rest = rest_shape(experiment.arm);
+  const Eigen::VectorXd rest = *rest_shape(experiment.arm, Eigen::VectorXd::Zero(6));
   EXPECT_GT(rest.segment<2>(0).norm(), 0.05);
   // At rest the potential of gravity and springs is stationary.
   const auto potential = [&](const Eigen::VectorXd& u) {

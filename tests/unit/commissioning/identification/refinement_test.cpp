@@ -233,5 +233,19 @@ TEST(Refinement, RefusesWhatCannotBeSimulated) {
   EXPECT_THROW(ResponseModel(record).longest_step_s(arm), std::runtime_error);
 }
 
+/// Without inertia the fastest mode is (k + G_u) / beta; the weight of an arm that stands out
+/// sideways, which is there without a bend, is no part of it.
+TEST(Refinement, TheStepOfAQuasiStaticArmIsThatOfItsStiffnessHoweverItIsMounted) {
+  Experiment experiment = one_segment();
+  const MotionRecord record = test::plant_record(experiment, 1, 0.2, 0.2, 200.0);
+  experiment.arm.base_rotation =
+      Eigen::AngleAxisd(M_PI / 2, Eigen::Vector3d::UnitY()).toRotationMatrix();
+  ArmHypothesis arm = believed(experiment);
+  arm.inertia = false;
+  const SegmentParameters& segment = experiment.arm.segments[0];
+  const double modes_s = segment.damping_nms_per_rad / segment.stiffness_nm_per_rad;
+  EXPECT_NEAR(ResponseModel(record).longest_step_s(arm), 2.0 * modes_s, 0.1 * modes_s);
+}
+
 }  // namespace
 }  // namespace softarm
