@@ -9,6 +9,7 @@
 #include "apps/program.hpp"
 #include "apps/signals.hpp"
 #include "softarm/base/clock.hpp"
+#include "softarm/base/time.hpp"
 #include "softarm/transport/message_decoding.hpp"
 
 namespace softarm {
@@ -27,7 +28,7 @@ PlantProcess::PlantProcess(const Experiment& experiment, std::optional<int> modb
       node_(lcm_.url),
       // Registers hold until the terminal's own time-out, and for ever without one.
       arm_(experiment.plant, monotonic_now_ns(),
-           modbus_port ? CommandExpiry::kNever
+           modbus_port ? kForever
                        : std::llround(1e9 * experiment.safety.command_validity_s)),
       by_torque_(experiment.plant.actuation.kind == ActuationKind::torque),
       report_period_ns_(static_cast<std::int64_t>(1e9 / experiment.plant.mocap.rate_hz)) {
@@ -82,7 +83,7 @@ void PlantProcess::serve_requests(std::int64_t deadline_ns) {
   const double timeout_s = terminal.timeout_s();
   arm_.command({.sequence = modbus_->sequence++,
                 .validity_ns = timeout_s > 0.0 ? static_cast<std::int64_t>(1e9 * timeout_s)
-                                               : CommandExpiry::kNever,
+                                               : kForever,
                 .pressure_bar = {bar.data(), static_cast<std::size_t>(bar.size())}},
                arm_now_ns());
 }
