@@ -7,8 +7,8 @@
 #include <stdexcept>
 
 #include "softarm/estimation/curvature_estimator.hpp"
-#include "softarm/model/kinematics.hpp"
 #include "softarm/model/statics.hpp"
+#include "softarm/transport/pose_convention.hpp"
 #include "softarm/transport/settings.hpp"
 
 namespace softarm {
@@ -16,20 +16,7 @@ namespace {
 
 constexpr std::size_t kFewestFrames = 50;
 
-Eigen::Isometry3d pose_of(const PlateSettings& plate) {
-  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
-  const double angle = plate.rotation_rad.norm();
-  if (angle > 0.0)
-    pose.linear() = Eigen::AngleAxisd(angle, plate.rotation_rad / angle).toRotationMatrix();
-  pose.translation() = plate.position_m;
-  return pose;
-}
-
-void set(PlateSettings& plate, const Eigen::Isometry3d& pose) {
-  const Eigen::AngleAxisd turn(pose.linear());
-  plate.rotation_rad = turn.angle() * turn.axis();
-  plate.position_m = pose.translation();
-}
+Eigen::Isometry3d pose_of(const PlateSettings& plate) { return to_isometry(pose_on_body(plate)); }
 
 /// The shape that gravity gives the arm without pressure.
 Eigen::VectorXd hanging_shape(const ArmParameters& arm) {
@@ -73,21 +60,18 @@ Eigen::Isometry3d levelled(const Eigen::Isometry3d& base, const ArmParameters& a
 BodySettings plates_from(const Experiment& experiment, const Eigen::VectorXd& rest_u_rad,
                          std::span<const Eigen::Isometry3d> mean, BaseSource source) {
   BodySettings out = experiment.transport.bodies;
-  const ArmParameters& arm = experiment.arm;
-  Eigen::Isometry3d base = mean[0];
-  if (out.base_id >= 0) {
-    base = base * pose_of(out.base_plate);
-    if (source == BaseSource::arm) base = levelled(base, arm);
-    if (source == BaseSource::arm) set(out.base_plate, mean[0].inverse() * base);
-  }
-  ArmParameters at_base = arm;
+  const bool fixed = out.base_id < 0;
+  Eigen::Isometry3d base = fixed ? mean[0] : mean[0] * pose_of(out.base_plate);
+  if (!fixed && source == BaseSource::arm) base = levelled(base, experiment.arm);
+  ArmParameters at_base = experiment.arm;
   at_base.base_position_m = base.translation();
   at_base.base_rotation = base.linear();
-  std::vector<Eigen::Isometry3d> ends(static_cast<std::size_t>(arm.size()));
-  forward_kinematics(at_base, rest_u_rad, ends);
-  out.segment_plates.resize(ends.size());
-  for (std::size_t i = 0; i < ends.size(); ++i)
-    set(out.segment_plates[i], mean[i + 1].inverse() * ends[i]);
+  const std::vector<Eigen::Isometry3d> found = frames_on_bodies(at_base, rest_u_rad, mean);
+  if (!fixed && source == BaseSource::arm)
+    out.base_plate = with_pose_on_body(out.base_plate, found[0]);
+  out.segment_plates.resize(found.size() - 1);
+  for (std::size_t i = 1; i < found.size(); ++i)
+    out.segment_plates[i - 1] = with_pose_on_body(out.segment_plates[i - 1], found[i]);
   return out;
 }
 

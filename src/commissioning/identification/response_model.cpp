@@ -8,6 +8,7 @@
 #include <limits>
 #include <stdexcept>
 
+#include "softarm/actuation/input_map.hpp"
 #include "softarm/model/actuation_matrix.hpp"
 #include "softarm/model/statics.hpp"
 
@@ -22,19 +23,14 @@ ArmHypothesis hypothesis(const ArmParameters& arm, const ActuationSettings& actu
   ArmHypothesis out;
   out.arm = arm;
   out.rest_rad.setZero(arm.dof());
-  const bool torque = actuation.kind == ActuationKind::torque;
-  for (std::size_t i = 0; i < actuation.segments.size(); ++i)
-    for (std::size_t j = 0; j < actuation.segments[i].size(); ++j) {
-      const Chamber& chamber = actuation.segments[i][j];
-      out.push.conservativeResize(2, out.push.cols() + 1);
-      if (torque) {  // A_chamber of a unit moment about x, or y
-        out.push.rightCols<1>() << (j == 0 ? 0.0 : 1.0), (j == 0 ? -1.0 : 0.0);
-      } else {
-        out.push.rightCols<1>() << -chamber.gain_nm_per_bar * std::cos(chamber.angle_rad),
-            -chamber.gain_nm_per_bar * std::sin(chamber.angle_rad);
-      }
-      out.segment_of.push_back(static_cast<int>(i));
-    }
+  out.push.resize(2, chamber_count(actuation));
+  Eigen::Index first = 0;
+  for (std::size_t i = 0; i < actuation.segments.size(); ++i) {
+    const Eigen::Matrix2Xd map = input_map(actuation.kind, actuation.segments[i]);
+    out.push.middleCols(first, map.cols()) = map;
+    out.segment_of.insert(out.segment_of.end(), actuation.segments[i].size(), static_cast<int>(i));
+    first += map.cols();
+  }
   return out;
 }
 

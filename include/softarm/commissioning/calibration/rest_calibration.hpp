@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "commissioning/calibration/pose_statistics.hpp"
 #include "softarm/config/experiment.hpp"
 #include "softarm/estimation/mocap_frame.hpp"
+#include "softarm/estimation/pose_statistics.hpp"
 #include "softarm/transport/settings.hpp"
 
 namespace softarm {

@@ -235,18 +235,5 @@ TEST_F(Calibration, WhatIsWrittenLoads) {
   EXPECT_NE(calibration_text(experiment, found).find("not told by a still arm"), std::string::npos);
 }
 
-TEST(MeanRotation, DoesNotDependOnSignsAndIsInTheMiddle) {
-  const Eigen::Vector3d axis = Eigen::Vector3d(1, 2, 3).normalized();
-  std::vector<TimedPose> poses;
-  for (const double angle : {3.0, 3.1, 3.2, 3.3}) {  // across half a turn, where signs change
-    TimedPose pose;
-    pose.orientation = Eigen::Quaterniond(Eigen::AngleAxisd(angle, axis));
-    if (poses.size() % 2 == 1) pose.orientation.coeffs() *= -1.0;
-    poses.push_back(pose);
-  }
-  const Eigen::Quaterniond wanted(Eigen::AngleAxisd(3.15, axis));
-  EXPECT_LT(mean_rotation(poses).angularDistance(wanted), 1e-12);
-}
-
 }  // namespace
 }  // namespace softarm

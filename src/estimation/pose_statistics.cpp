@@ -1,9 +1,11 @@
-#include "commissioning/calibration/pose_statistics.hpp"
+#include "softarm/estimation/pose_statistics.hpp"
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <vector>
+
+#include "softarm/model/kinematics.hpp"
 
 namespace softarm {
 namespace {
@@ -58,26 +60,45 @@ Scatter scatter(const std::vector<Eigen::Vector3d>& values, std::span<const Time
 
 }  // namespace
 
-Eigen::Quaterniond mean_rotation(std::span<const TimedPose> poses) {
-  Eigen::Matrix4d sum = Eigen::Matrix4d::Zero();
-  for (const TimedPose& pose : poses) {
-    const Eigen::Vector4d q = pose.orientation.normalized().coeffs();
-    sum += q * q.transpose();
-  }
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix4d> solver(sum);
+void MeanPose::add(const Eigen::Vector3d& position_m,
+                   const Eigen::Quaterniond& orientation) noexcept {
+  ++count_;
+  position_sum_ += position_m;
+  const double length = orientation.norm();
+  length_sum_ += length;
+  if (length == 0.0) return;
+  const Eigen::Vector4d q = orientation.coeffs() / length;
+  products_ += q * q.transpose();
+}
+
+Eigen::Quaterniond MeanPose::orientation() const noexcept {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix4d> solver(products_);
   const Eigen::Vector4d largest = solver.eigenvectors().col(3);
   return Eigen::Quaterniond(largest).normalized();
+}
+
+Eigen::Isometry3d MeanPose::pose() const noexcept {
+  return Eigen::Translation3d(position_m()) * orientation();
+}
+
+std::vector<Eigen::Isometry3d> frames_on_bodies(const ArmParameters& arm, ConstVectorRef u_rad,
+                                                std::span<const Eigen::Isometry3d> mean) {
+  std::vector<Eigen::Isometry3d> frames(static_cast<std::size_t>(arm.size()) + 1);
+  frames[0].linear() = arm.base_rotation;
+  frames[0].translation() = arm.base_position_m;
+  forward_kinematics(arm, u_rad, std::span(frames).subspan(1));
+  for (std::size_t i = 0; i < frames.size(); ++i) frames[i] = mean[i].inverse() * frames[i];
+  return frames;
 }
 
 PoseStatistics pose_statistics(std::span<const TimedPose> poses) {
   PoseStatistics out;
   out.frames = static_cast<int>(poses.size());
-  const Eigen::Quaterniond orientation = mean_rotation(poses);
-  Eigen::Vector3d position = Eigen::Vector3d::Zero();
-  for (const TimedPose& pose : poses)
-    position += pose.position_m / static_cast<double>(poses.size());
-  out.mean.linear() = orientation.toRotationMatrix();
-  out.mean.translation() = position;
+  MeanPose mean;
+  for (const TimedPose& pose : poses) mean.add(pose.position_m, pose.orientation);
+  out.mean = mean.pose();
+  const Eigen::Vector3d position = mean.position_m();
+  const Eigen::Quaterniond orientation = mean.orientation();
   std::vector<Eigen::Vector3d> shifts, turns;
   for (const TimedPose& pose : poses) {
     shifts.push_back(pose.position_m - position);
