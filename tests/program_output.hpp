@@ -1,4 +1,4 @@
-// Runs `softarm` as a user would and keeps what it says.
+// Runs one of our programs as a user would and keeps what it prints.
 #pragma once
 
 #include <sys/wait.h>
@@ -14,8 +14,8 @@ struct Outcome {
   std::string text;  ///< standard output and standard error
 };
 
-inline Outcome run(const std::string& arguments) {
-  const std::string command = SOFTARM_BINARY_DIR "/bin/softarm " + arguments + " 2>&1";
+inline Outcome run(const std::string& arguments, const std::string& program = "softarm") {
+  const std::string command = SOFTARM_BINARY_DIR "/bin/" + program + " " + arguments + " 2>&1";
   Outcome outcome;
   FILE* pipe = popen(command.c_str(), "r");
   if (pipe == nullptr) return outcome;

@@ -14,7 +14,7 @@
 #include "softarm/actuation/pressure_allocator.hpp"
 #include "softarm/control/curvature_controller.hpp"
 #include "softarm/control/reference.hpp"
-#include "softarm/daemon/safety_monitor.hpp"
+#include "softarm/runtime/safety_monitor.hpp"
 #include "softarm/valves/register_map.hpp"
 
 namespace softarm {
@@ -34,7 +34,7 @@ class Checks {
   void run() const {
     check_rotation("arm.base.rotation", experiment_.arm.base_rotation);
     check_rotation("plant.arm.base.rotation", experiment_.plant.arm.base_rotation);
-    check_rotation("daemon.mocap.axes", experiment_.daemon.mocap.axes);
+    check_rotation("daemon.mocap.axes", experiment_.transport.mocap.axes);
     check_radius("arm", experiment_.arm, false);
     check_radius("plant.arm", experiment_.plant.arm, experiment_.plant.kind == PlantKind::links);
     check_actuation("actuation", experiment_.actuation);
@@ -139,7 +139,7 @@ class Checks {
     const bool torque = model.kind == ActuationKind::torque;
     require(plant.kind == model.kind, "plant.actuation.kind", "the same as actuation.kind",
             torque ? "chambers" : "torque");
-    require(!torque || !experiment_.daemon.safety.valve_readback, "daemon.safety.valve_readback",
+    require(!torque || !experiment_.safety.valve_readback, "daemon.safety.valve_readback",
             "false with actuation by torque: it is for simulated arms, which have no valves then",
             "true");
     for (std::size_t i = 0; i < model.segments.size(); ++i) {
@@ -202,7 +202,7 @@ class Checks {
   }
 
   void check_bodies() const {
-    const BodySettings& bodies = experiment_.daemon.bodies;
+    const BodySettings& bodies = experiment_.transport.bodies;
     std::set<int> seen;
     for (const int id : bodies.segment_ids) {
       once(seen, id, "daemon.bodies.segment_ids", "every body once",
@@ -215,9 +215,8 @@ class Checks {
 
   /// A threshold that another one hides never comes into force: it protects nobody.
   void check_safety() const {
-    const DaemonSettings& daemon = experiment_.daemon;
-    const SafetySettings& it = daemon.safety;
-    const double tick_s = 1.0 / daemon.rate_hz;
+    const SafetySettings& it = experiment_.safety;
+    const double tick_s = 1.0 / experiment_.rate_hz;
     const SafetyThresholds resolved = resolve_thresholds(it, tick_s);
     const double hold_s = 1e-9 * static_cast<double>(resolved.hold_after_ns);
     const double vent_s = 1e-9 * static_cast<double>(resolved.vent_after_ns);
@@ -241,10 +240,9 @@ class Checks {
             experiment_.actuation.max_pressure_bar, "actuation.max_pressure_bar",
             ": otherwise no leak is ever seen");
     }
-    for (const auto& [key, time_s] :
-         {std::pair("safety.valve_silence_s", it.valve_silence_s),
-          std::pair("safety.deadman_timeout_s", it.deadman_timeout_s),
-          std::pair("lcm.command_validity_s", daemon.lcm.command_validity_s)})
+    for (const auto& [key, time_s] : {std::pair("safety.valve_silence_s", it.valve_silence_s),
+                                      std::pair("safety.deadman_timeout_s", it.deadman_timeout_s),
+                                      std::pair("lcm.command_validity_s", it.command_validity_s)})
       at_least(fmt::format("daemon.{}", key), time_s, 2.0 * tick_s, "two ticks of daemon.rate_hz");
   }
 
@@ -262,21 +260,21 @@ class Checks {
   }
 
   void check_lcm() const {
-    const DaemonSettings& daemon = experiment_.daemon;
+    const TransportSettings& transport = experiment_.transport;
     std::set<std::string> seen;
     for (const ChannelKey& it : kChannelKeys) {
-      const std::string& name = daemon.lcm.*it.channel;
+      const std::string& name = transport.lcm.*it.channel;
       if (!name.empty()) check_channel(seen, fmt::format("daemon.lcm.{}", it.name), name, name);
     }
-    if (daemon.mocap.source == MocapSourceKind::rigid_transform) {  // every body has its own
+    if (transport.mocap.source == MocapSourceKind::rigid_transform) {  // every body has its own
       const auto check = [&](const char* key, const PlateSettings& body) {
-        check_channel(seen, key, body.name, body_channel(daemon.lcm, body));
+        check_channel(seen, key, body.name, body_channel(transport.lcm, body));
       };
-      const BodySettings& bodies = daemon.bodies;
+      const BodySettings& bodies = transport.bodies;
       if (bodies.base_id >= 0) check("daemon.bodies.base_plate.name", bodies.base_plate);
       for (const auto& body : bodies.segment_plates) check("daemon.bodies.segment_plates", body);
     }
-    const std::string& url = daemon.lcm.url;
+    const std::string& url = transport.lcm.url;
     const std::string example = ", such as udpm://239.255.76.67:7667?ttl=0";
     require(url.find("://") != std::string::npos, "daemon.lcm.url", "an LCM provider" + example,
             in_quotes(url));
@@ -292,9 +290,6 @@ class Checks {
     const double max_bar = experiment_.actuation.max_pressure_bar;
     // Arms that have no terminal need not fit into one.
     if (experiment_.actuation.kind == ActuationKind::torque || !keys_.given("valves")) return;
-    in_addr address{};
-    require(inet_pton(AF_INET, it.host.c_str(), &address) == 1, "valves.host", "an IPv4 address",
-            in_quotes(it.host));
     std::set<int> seen;
     for (const int valve : it.order)
       once(seen, valve, "valves.order", "every valve once", fmt::format("valve {} twice", valve));
@@ -305,17 +300,25 @@ class Checks {
     at_least("valves.longest_backoff_s", it.longest_backoff_s, it.backoff_s, "backoff_s");
     below("valves.stuck_bar", it.stuck_bar, max_bar, "actuation.max_pressure_bar",
           ": otherwise no valve ever counts as stuck");
-    const double least_s = std::max(it.registers.timeout_least_s, silent_s);
-    require(it.failsafe_timeout_s >= least_s, "valves.failsafe_timeout_s",
-            fmt::format("at least {:.6g} s (what the terminal takes, and tolerated_failures + 1 "
-                        "periods)",
-                        least_s),
+    require(it.failsafe_timeout_s >= silent_s, "valves.failsafe_timeout_s",
+            fmt::format("at least {:.6g} s (tolerated_failures + 1 periods)", silent_s),
+            fmt::format("{} s", it.failsafe_timeout_s));
+    if (it.backend == "modbus") check_terminal(it);
+  }
+
+  void check_terminal(const ValveDriverSettings& it) const {
+    in_addr address{};
+    require(inet_pton(AF_INET, it.host.c_str(), &address) == 1, "valves.host", "an IPv4 address",
+            in_quotes(it.host));
+    require(it.failsafe_timeout_s >= it.registers.timeout_least_s, "valves.failsafe_timeout_s",
+            fmt::format("at least {:.6g} s, what the terminal takes", it.registers.timeout_least_s),
             fmt::format("{} s", it.failsafe_timeout_s));
     const double units = it.failsafe_timeout_s / it.registers.timeout_unit_s;
     require(units >= 0.5 && units < (it.registers.timeout_words == 2 ? 4294967295.0 : 65535.0),
             "valves.failsafe_timeout_s", "a time-out that fits its register",
             fmt::format("{:.6g} units", units));
-    const std::string fault = register_map_fault(it.registers, it.order, max_bar);
+    const std::string fault =
+        register_map_fault(it.registers, it.order, experiment_.actuation.max_pressure_bar);
     require(fault.empty(), "valves.registers", "registers that fit together", fault);
   }
 

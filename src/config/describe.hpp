@@ -21,7 +21,7 @@ inline constexpr auto kRequired = Presence::required;
 void describe(Keys& key, Experiment& it);
 
 // Its parts, in files of their own.
-void describe(Keys& key, DaemonSettings& it);
+void describe_daemon(Keys& key, Experiment& it);
 void describe(Keys& key, ValveDriverSettings& it);
 void describe_reference(Keys& key, ReferenceSettings& it);
 /// The simulated arm starts from what the controller's keys are.
@@ -46,6 +46,7 @@ struct PhaseKind {
   const char* name;
   ReferenceKind empty;
 };
+/// A function, not a constant: an experiment may be loaded before main.
 const std::array<PhaseKind, 7>& phase_kinds();
 
 }  // namespace softarm

@@ -164,7 +164,8 @@ void describe(Keys& key, Experiment& it) {
   KEY(estimation, "from motion-capture frames to u");
   key.section({"control", "the controller (17)", kRequired}, [&] { describe(key, it.control); });
   describe_reference(key, it.reference);
-  KEY(daemon, "rate, safety and connections of softarmd");
+  key.section({"daemon", "rate, safety and connections of softarmd"},
+              [&] { describe_daemon(key, it); });
   if (it.valves.order.empty()) {
     it.valves.order.resize(static_cast<std::size_t>(chamber_count(it.actuation)));
     std::iota(it.valves.order.begin(), it.valves.order.end(), 0);

@@ -66,7 +66,7 @@ static void describe(Keys& key, TipPathReference& it) {
 }
 
 const std::array<PhaseKind, 7>& phase_kinds() {
-  static const std::array<PhaseKind, 7> kKinds = {{
+  static const std::array<PhaseKind, 7> kinds = {{
       {"set_point", SetPointReference{}},
       {"paper", PaperReference{}},
       {"way_points", WayPointReference{}},
@@ -75,7 +75,7 @@ const std::array<PhaseKind, 7>& phase_kinds() {
       {"tip_circle", TipPathReference{.shape = TipPathShape::circle}},
       {"tip_lemniscate", TipPathReference{.shape = TipPathShape::lemniscate}},
   }};
-  return kKinds;
+  return kinds;
 }
 
 /// Index of the kind of a phase.
@@ -85,8 +85,9 @@ static int kind_of(const ReferenceKind& kind) {
 }
 
 void describe_reference(Keys& key, ReferenceSettings& it) {
-  std::vector<const char*> names;
-  for (const PhaseKind& kind : phase_kinds()) names.push_back(kind.name);
+  const auto& kinds = phase_kinds();
+  std::vector<const char*> names(kinds.size());
+  for (std::size_t i = 0; i < names.size(); ++i) names[i] = kinds[i].name;
   const Key list = {"reference", "phases one after the other; time starts at ACTIVE", kRequired};
   key.list(list, it.phases, [&](ReferencePhase& phase) {
     int kind = kind_of(phase.kind);
@@ -94,7 +95,7 @@ void describe_reference(Keys& key, ReferenceSettings& it) {
         "set_point: hold; paper: (24); way_points; live: what comes over LCM; tip_...: a path of "
         "the tip by (21), tip_lemniscate: (22)",
         kRequired);
-    if (key.reading()) phase.kind = phase_kinds()[static_cast<std::size_t>(kind)].empty;
+    if (key.reading()) phase.kind = kinds[static_cast<std::size_t>(kind)].empty;
     key.when(&phase != &it.phases.back(), [&] {
       key("duration_s", phase.duration_s, above(0, kMany),
           "of the phase; the last one lasts for ever and has none", kRequired);
@@ -132,18 +133,18 @@ static void describe(Keys& key, SafetySettings& it) {
   KEY(deadman_timeout_s, above(0, 10), "without a go on lcm.deadman_channel: VENT");
 }
 
-static void describe_mocap(Keys& key, DaemonSettings& daemon) {
+static void describe_mocap(Keys& key, TransportSettings& transport) {
   const std::vector<double> z_up = {1, 0, 0, 0, 1, 0, 0, 0, 1};
   const std::vector<double> y_up = {1, 0, 0, 0, 0, -1, 0, 1, 0};
-  MocapSourceSettings& it = daemon.mocap;
+  MocapSourceSettings& it = transport.mocap;
   KEY(source, one_of({"softarm", "optitrack", "rigid_transform"}),
       "softarm: mocap_frame_t; optitrack: optitrack_frame_t; rigid_transform: rigid_transform_t "
       "(Vicon), one channel a body");
   if (key.reading()) {
     const bool optitrack = it.source == MocapSourceKind::optitrack;
     it.quaternion = optitrack ? QuaternionOrder::xyzw : QuaternionOrder::wxyz;
-    if (optitrack) daemon.lcm.mocap_channel = "OPTITRACK_FRAMES";
-    if (it.source == MocapSourceKind::rigid_transform) daemon.lcm.mocap_channel = "VICON";
+    if (optitrack) transport.lcm.mocap_channel = "OPTITRACK_FRAMES";
+    if (it.source == MocapSourceKind::rigid_transform) transport.lcm.mocap_channel = "VICON";
   }
   KEY(unit, one_of({"m", "mm"}), "of the positions sent");
   KEY(quaternion, one_of({"xyzw", "wxyz"}), "order; left out: xyzw for optitrack, else wxyz");
@@ -207,25 +208,28 @@ constinit const std::array<ChannelKey, 11> kChannelKeys = {{
     {"deadman_channel", &LcmSettings::deadman_channel, 0, "go of a dead-man input; empty: none"},
 }};
 
-static void describe(Keys& key, LcmSettings& it) {
+static void describe_lcm(Keys& key, LcmSettings& it, SafetySettings& safety) {
   KEY(url, from(1, 200), "LCM provider; the time to live keeps messages on this machine");
   for (const auto& [name, channel, fewest, doc] : kChannelKeys)
     key(name, it.*channel, from(fewest, 63), doc);
-  KEY(command_validity_s, above(0, 10), "after which the valve side vents by itself");
+  key("command_validity_s", safety.command_validity_s, above(0, 10),
+      "after which the valve side vents by itself");
 }
 
-void describe(Keys& key, DaemonSettings& it) {
+void describe_daemon(Keys& key, Experiment& it) {
+  TransportSettings& transport = it.transport;
   KEY(rate_hz, from(1, 20000), "of the tick");
-  KEY(capture_time, one_of({"sender", "latency"}),
+  key("capture_time", transport.capture_time, one_of({"sender", "latency"}),
       "sender: its clock, related to ours; latency: arrival minus frame_latency_s");
   KEY(safety, "thresholds of the safety monitor");
   key.section({"mocap", "who sends frames, and what the numbers mean"},
-              [&] { describe_mocap(key, it); });
-  const bool named = it.mocap.source == MocapSourceKind::rigid_transform;
+              [&] { describe_mocap(key, transport); });
+  const bool named = transport.mocap.source == MocapSourceKind::rigid_transform;
   key.section({"bodies", "which bodies of a frame carry the base and the segments' ends"},
-              [&] { describe_bodies(key, it.bodies, named); });
+              [&] { describe_bodies(key, transport.bodies, named); });
   KEY(realtime, "the daemon's place on the machine");
-  KEY(lcm, "channels, distinct where two arms share a machine");
+  key.section({"lcm", "channels, distinct where two arms share a machine"},
+              [&] { describe_lcm(key, transport.lcm, it.safety); });
 }
 
 }  // namespace softarm

@@ -68,9 +68,7 @@ static void describe(Keys& key, RefinedSettings& it) {
 static void describe(Keys& key, LinkSettings& it) {
   KEY(links_per_segment, from(1, kMaxLinksPerSegment),
       "each with two crossed revolute joints at its start");
-  KEY(joints, one_of({"crossed", "polar"}),
-      "crossed: two angles about x and y; polar: the paper's phi and theta, singular where "
-      "straight, for comparison only");
+  KEY(joints, one_of({"crossed"}), "crossed: two angles, about x and y");
   KEY(joint_stiffness_nm_per_rad, from(0, 1e6),
       "of every joint about each axis; left out: k times links_per_segment");
   KEY(joint_damping_nms_per_rad, from(0, 1e6), "the same; left out: beta times links_per_segment");
@@ -89,10 +87,9 @@ static void describe_world(Keys& key, PlantSettings& it) {
 }
 
 static void describe_integrator(Keys& key, PlantSettings& it) {
-  key("integrator", it.method,
-      one_of({"sdirk2", "cash4", "sdirk4", "erk", "cvode_bdf", "cvode_adams", "ida"}),
+  key("integrator", it.method, one_of({"sdirk2", "cash4", "sdirk4", "erk", "cvode_bdf"}),
       "method of SUNDIALS: one-step and implicit (sdirk2, cash4, sdirk4) or explicit (erk), "
-      "multistep (the others)");
+      "multistep (cvode_bdf)");
   if (key.reading() && it.method != IntegratorMethod::sdirk2) {
     // Whoever chooses another method wants its accuracy.
     it.relative_tolerance = 1e-6;

@@ -7,20 +7,11 @@
 #include "config/checks.hpp"
 #include "config/describe.hpp"
 #include "config/printers.hpp"
+#include "softarm/base/hash.hpp"
 #include "softarm/valves/register_map.hpp"
 
 namespace softarm {
 namespace {
-
-/// FNV-1a, 64 bits.
-std::uint64_t fnv1a(const std::string& text) {
-  std::uint64_t hash = 14695981039346656037ull;
-  for (const char c : text) {
-    hash ^= static_cast<unsigned char>(c);
-    hash *= 1099511628211ull;
-  }
-  return hash;
-}
 
 /// One description reads and writes: what is printed is a copy.
 Entry entries_of(Experiment experiment, Keys::Purpose purpose) {
@@ -61,6 +52,8 @@ Experiment read(const std::filesystem::path& file) {
   Keys keys(file);
   Experiment experiment;
   keys.visit([&] { describe(keys, experiment); });
+  experiment.estimation.base_is_fixed = experiment.transport.bodies.base_id < 0;
+  experiment.safety.deadman = !experiment.transport.lcm.deadman_channel.empty();
   check_consistency(experiment, keys);
   experiment.hash = fnv1a(resolved_text(experiment));
   return experiment;

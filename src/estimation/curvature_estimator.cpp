@@ -122,11 +122,10 @@ double checked_sigma(double value, const char* name, std::size_t body) {
 
 }  // namespace
 
-std::vector<BodyNoise> body_noise(const EstimationSettings& settings, int segments,
-                                  bool base_is_fixed) {
+std::vector<BodyNoise> body_noise(const EstimationSettings& settings, int segments) {
   const BodyNoise measured{settings.position_noise_m, settings.orientation_noise_rad};
   std::vector<BodyNoise> noise(static_cast<std::size_t>(segments) + 1, measured);
-  if (base_is_fixed) noise.front() = BodyNoise{};
+  if (settings.base_is_fixed) noise.front() = BodyNoise{};
   return noise;
 }
 

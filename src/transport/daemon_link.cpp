@@ -1,11 +1,13 @@
 #include "softarm/transport/daemon_link.hpp"
 
-#include <time.h>
-
 #include <algorithm>
 #include <cmath>
 
+#include "softarm/base/clock.hpp"
+#include "softarm/base/time.hpp"
+#include "softarm/runtime/settings.hpp"
 #include "softarm/transport/message_decoding.hpp"
+#include "softarm/transport/settings.hpp"
 
 namespace softarm {
 namespace {
@@ -13,22 +15,16 @@ namespace {
 /// What may arrive between two ticks; more is dropped by LCM and counted as missing.
 constexpr int kFrameCapacity = TickRecorder::kMostFrames;
 constexpr int kOtherCapacity = 16;
-constexpr auto kNever = std::numeric_limits<std::int64_t>::min();
 /// After so long a silence a sender of references or requests may begin its numbers anew.
 constexpr std::int64_t kNumberForgotten_ns = 500'000'000;
 
-std::int64_t wall_clock_ns() noexcept {
-  timespec now{};
-  clock_gettime(CLOCK_REALTIME, &now);
-  return std::int64_t{now.tv_sec} * 1'000'000'000 + now.tv_nsec;
-}
-
 }  // namespace
 
-DaemonLink::DaemonLink(const PipelineSettings& settings, const Provenance& provenance, bool shadow)
-    : settings_(settings.daemon),
-      mocap_(settings.daemon, settings.arm),
-      node_(settings.daemon.lcm.url),
+DaemonLink::DaemonLink(const PipelineSettings& settings, const TransportSettings& transport,
+                       const Provenance& provenance, bool shadow)
+    : lcm_(transport.lcm),
+      mocap_(transport, settings.safety, settings.arm),
+      node_(transport.lcm.url),
       dof_(settings.arm.dof()),
       messages_(settings, provenance, shadow),
       newest_measurement_ns_(kNever),
@@ -36,7 +32,7 @@ DaemonLink::DaemonLink(const PipelineSettings& settings, const Provenance& prove
       go_sequence_(kNever),
       reference_sequence_(kNever),
       operator_sequence_(kNever) {
-  if (!settings_.lcm.tick_channel.empty()) recorder_.emplace(settings, provenance, shadow);
+  if (!lcm_.tick_channel.empty()) recorder_.emplace(settings, provenance, shadow);
   frames_.resize(static_cast<std::size_t>(
       recorder_ ? std::min(kFrameCapacity, recorder_->frame_capacity()) : kFrameCapacity));
   // Everything that grows is grown here, so that the loop never has to.
@@ -49,22 +45,20 @@ DaemonLink::DaemonLink(const PipelineSettings& settings, const Provenance& prove
   for (std::size_t k = 0; k < mocap_.channels().size(); ++k)
     node_.subscribe(mocap_.channels()[k], kFrameCapacity,
                     [this, k](const auto& packet) { take_frame(k, packet); });
-  node_.subscribe(settings_.lcm.reference_channel, kOtherCapacity,
+  node_.subscribe(lcm_.reference_channel, kOtherCapacity,
                   [this](const auto& packet) { take_reference(packet); });
-  node_.subscribe(settings_.lcm.operator_channel, kOtherCapacity,
+  node_.subscribe(lcm_.operator_channel, kOtherCapacity,
                   [this](const auto& packet) { take_operator(packet); });
-  if (settings_.safety.valve_readback)
-    node_.subscribe(settings_.lcm.measurement_channel, kOtherCapacity,
+  if (settings.safety.valve_readback)
+    node_.subscribe(lcm_.measurement_channel, kOtherCapacity,
                     [this](const auto& packet) { take_measurement(packet); });
-  if (!settings_.lcm.deadman_channel.empty())
-    node_.subscribe(settings_.lcm.deadman_channel, kOtherCapacity,
+  if (!lcm_.deadman_channel.empty())
+    node_.subscribe(lcm_.deadman_channel, kOtherCapacity,
                     [this](const auto& packet) { take_go(packet); });
 }
 
 TickInput DaemonLink::collect(std::int64_t now_ns) noexcept {
-  previous_collect_ns_ = now_ns_;
   now_ns_ = now_ns;
-  wall_minus_monotonic_ns_ = wall_clock_ns() - now_ns;
   frame_count_ = 0;
   input_ = {};
   input_.now_ns = now_ns;
@@ -78,11 +72,9 @@ TickInput DaemonLink::collect(std::int64_t now_ns) noexcept {
   return input_;
 }
 
-/// LCM stamps arrivals with the wall clock. Brought to ours they can only lie between the last
-/// collection and now: so a wall clock that is set meanwhile does no harm.
+/// What comes in while the queue is emptied belongs to this tick as well.
 std::int64_t DaemonLink::arrival_ns(const ReceivedMessage& packet) const noexcept {
-  const std::int64_t arrival = packet.arrival_utime_us * 1000 - wall_minus_monotonic_ns_;
-  return std::clamp(arrival, previous_collect_ns_, now_ns_);
+  return std::min(packet.arrival_ns, now_ns_);
 }
 
 void DaemonLink::take_frame(std::size_t channel, const ReceivedMessage& packet) noexcept {
@@ -98,7 +90,7 @@ void DaemonLink::take_reference(const ReceivedMessage& packet) noexcept {
     ++malformed_;
     return;
   }
-  const bool forgotten = now_ns_ - newest_reference_ns_ > kNumberForgotten_ns;
+  const bool forgotten = age_ns(now_ns_, newest_reference_ns_) > kNumberForgotten_ns;
   if (reference_message_.sequence <= reference_sequence_ && !forgotten) return;
   reference_sequence_ = reference_message_.sequence;
   newest_reference_ns_ = now_ns_;
@@ -116,7 +108,7 @@ void DaemonLink::take_operator(const ReceivedMessage& packet) noexcept {
     return;
   }
   const bool newer = operator_message_.sequence > operator_sequence_ ||
-                     now_ns_ - newest_operator_ns_ > kNumberForgotten_ns;
+                     age_ns(now_ns_, newest_operator_ns_) > kNumberForgotten_ns;
   if (newer) operator_sequence_ = operator_message_.sequence;
   newest_operator_ns_ = now_ns_;
   // Whoever wants the arm vented is right, whatever the number; so is a request nobody knows.
@@ -161,7 +153,7 @@ void DaemonLink::publish_command(std::int64_t now_ns, const TickOutput& output) 
     return;
   }
   messages_.pressure_command.time_us = messages_.torque_command.time_us = now_us;
-  const std::string& channel = settings_.lcm.command_channel;
+  const std::string& channel = lcm_.command_channel;
   const bool sent = messages_.by_torque() ? node_.publish(channel, messages_.torque_command)
                                           : node_.publish(channel, messages_.pressure_command);
   if (sent) sent_us_ = now_us;
@@ -169,7 +161,7 @@ void DaemonLink::publish_command(std::int64_t now_ns, const TickOutput& output) 
 }
 
 bool DaemonLink::command_expired(std::int64_t now_us) const noexcept {
-  return now_us - sent_us_ >= messages_.pressure_command.validity_us;
+  return sent_us_ == kNever || now_us - sent_us_ >= messages_.pressure_command.validity_us;
 }
 
 void DaemonLink::publish_status(std::int64_t now_ns, const ControlPipeline& pipeline,
@@ -179,21 +171,21 @@ void DaemonLink::publish_status(std::int64_t now_ns, const ControlPipeline& pipe
   status.time_us = now_ns / 1000;
   status.overruns = counter(timing.overruns);
   status.messages_malformed = counter(malformed_);
-  if (!node_.publish(settings_.lcm.status_channel, status)) ++unsent_;
+  if (!node_.publish(lcm_.status_channel, status)) ++unsent_;
 }
 
 void DaemonLink::publish_record(const TickInput& input, const TickOutput& output) noexcept {
   if (!recorder_) return;
   if (recorder_->full()) repeat_record();
   const auto bytes = recorder_->record(commands_, input, output.pressure_bar);
-  if (!node_.publish_encoded(settings_.lcm.tick_channel, bytes)) ++unsent_;
+  if (!node_.publish_encoded(lcm_.tick_channel, bytes)) ++unsent_;
 }
 
 bool DaemonLink::repeat_record() noexcept {
   if (!recorder_) return false;
   const auto bytes = recorder_->take_oldest();
   if (bytes.empty()) return false;
-  if (!node_.publish_encoded(settings_.lcm.tick_channel, bytes)) ++unsent_;
+  if (!node_.publish_encoded(lcm_.tick_channel, bytes)) ++unsent_;
   return true;
 }
 
@@ -211,7 +203,7 @@ void DaemonLink::publish_timing(std::int64_t now_ns, const LoopTiming& timing) n
                    counter);
     message.max_us[k] = static_cast<float>(histograms[k]->max_us());
   }
-  if (!node_.publish(settings_.lcm.timing_channel, message)) ++unsent_;
+  if (!node_.publish(lcm_.timing_channel, message)) ++unsent_;
 }
 
 }  // namespace softarm

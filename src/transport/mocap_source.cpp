@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "softarm/runtime/settings.hpp"
 #include "softarm/transport/message_decoding.hpp"
+#include "softarm/transport/settings.hpp"
 
 namespace softarm {
 namespace {
@@ -19,23 +21,25 @@ std::int64_t to_us(double time_s) noexcept {
 
 }  // namespace
 
-std::vector<std::string> mocap_channels(const DaemonSettings& daemon) {
-  if (daemon.mocap.source != MocapSourceKind::rigid_transform) return {daemon.lcm.mocap_channel};
+std::vector<std::string> mocap_channels(const TransportSettings& transport) {
+  if (transport.mocap.source != MocapSourceKind::rigid_transform)
+    return {transport.lcm.mocap_channel};
   std::vector<std::string> channels;
-  if (daemon.bodies.base_id >= 0)
-    channels.push_back(body_channel(daemon.lcm, daemon.bodies.base_plate));
-  for (const PlateSettings& plate : daemon.bodies.segment_plates)
-    channels.push_back(body_channel(daemon.lcm, plate));
+  if (transport.bodies.base_id >= 0)
+    channels.push_back(body_channel(transport.lcm, transport.bodies.base_plate));
+  for (const PlateSettings& plate : transport.bodies.segment_plates)
+    channels.push_back(body_channel(transport.lcm, plate));
   return channels;
 }
 
-MocapSource::MocapSource(const DaemonSettings& daemon, const ArmParameters& arm)
-    : kind_(daemon.mocap.source),
-      adapter_(daemon.bodies, arm, daemon.mocap),
-      clock_(daemon.capture_time, daemon.safety.frame_latency_s),
-      channels_(mocap_channels(daemon)),
-      assembler_(static_cast<int>(daemon.bodies.segment_ids.size()), adapter_.base_is_fixed(),
-                 daemon.safety.frame_period_s) {
+MocapSource::MocapSource(const TransportSettings& transport, const SafetySettings& safety,
+                         const ArmParameters& arm)
+    : kind_(transport.mocap.source),
+      adapter_(transport.bodies, arm, transport.mocap),
+      clock_(transport.capture_time, safety.frame_latency_s),
+      channels_(mocap_channels(transport)),
+      assembler_(static_cast<int>(transport.bodies.segment_ids.size()), adapter_.base_is_fixed(),
+                 safety.frame_period_s) {
   message_.bodies.reserve(4 * static_cast<std::size_t>(kMaxBodies));
   if (kind_ == MocapSourceKind::optitrack) optitrack_ = std::make_unique<OptitrackFrame>();
 }
@@ -87,10 +91,10 @@ bool MocapSource::overdue(std::int64_t now_ns, MocapFrame& frame) noexcept {
   return assembler_.take_done(frame);
 }
 
-MocapSender::MocapSender(const DaemonSettings& daemon, const ArmParameters& arm)
-    : kind_(daemon.mocap.source),
-      adapter_(daemon.bodies, arm, daemon.mocap),
-      channels_(mocap_channels(daemon)) {}
+MocapSender::MocapSender(const TransportSettings& transport, const ArmParameters& arm)
+    : kind_(transport.mocap.source),
+      adapter_(transport.bodies, arm, transport.mocap),
+      channels_(mocap_channels(transport)) {}
 
 void MocapSender::publish(LcmNode& node, const MocapFrame& frame, std::int64_t sender_time_us) {
   if (kind_ == MocapSourceKind::softarm) {

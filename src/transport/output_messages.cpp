@@ -5,6 +5,8 @@
 #include <limits>
 #include <vector>
 
+#include "softarm/runtime/settings.hpp"
+
 namespace softarm {
 namespace {
 
@@ -50,7 +52,7 @@ OutputMessages::OutputMessages(const PipelineSettings& settings, const Provenanc
   // Everything that grows is grown here, so that the loop never has to.
   pressure_command.shadow = shadow ? 1 : 0;
   pressure_command.validity_us =
-      static_cast<std::int32_t>(std::lround(1e6 * settings.daemon.lcm.command_validity_s));
+      static_cast<std::int32_t>(std::lround(1e6 * settings.safety.command_validity_s));
   pressure_command.num_chambers = static_cast<std::int16_t>(chambers);
   pressure_command.pressure_bar.assign(chambers, 0.0F);
   torque_command.shadow = pressure_command.shadow;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "softarm/base/hash.hpp"
+#include "softarm/runtime/settings.hpp"
 #include "softarm/transport/lcm_node.hpp"
 
 namespace softarm {
@@ -12,13 +14,6 @@ using softarm_messages::tick_frame_t;
 using softarm_messages::tick_record_t;
 
 constexpr std::size_t kDigest = 8;  ///< at the end of every record
-
-std::uint64_t fnv1a(std::span<const std::byte> bytes) noexcept {
-  std::uint64_t hash = 14695981039346656037ull;
-  for (const std::byte each : bytes)
-    hash = (hash ^ std::to_integer<std::uint64_t>(each)) * 1099511628211ull;
-  return hash;
-}
 
 void put_digest(std::span<std::byte> encoded) noexcept {
   std::uint64_t digest = fnv1a(encoded.first(encoded.size() - kDigest));
@@ -174,7 +169,7 @@ TickRecorder::TickRecorder(const PipelineSettings& settings, const Provenance& p
                            bool shadow)
     : record_(largest_record(settings, provenance.build)),
       build_(provenance.build),
-      ticks_per_build_(std::max(1LL, std::llround(settings.daemon.rate_hz))),
+      ticks_per_build_(std::max(1LL, std::llround(settings.rate_hz))),
       slot_bytes_(static_cast<std::size_t>(record_.getEncodedSize())),
       slots_(kRepeatAfter * slot_bytes_),
       sizes_(kRepeatAfter) {

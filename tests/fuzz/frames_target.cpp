@@ -6,7 +6,7 @@
 #include "fuzz/target.hpp"
 #include "softarm/estimation/clock_relation.hpp"
 #include "unit/config/config_files.hpp"
-#include "unit/daemon/pipeline_bench.hpp"
+#include "unit/runtime/pipeline_bench.hpp"
 
 namespace softarm::test {
 namespace {
@@ -16,7 +16,7 @@ constexpr unsigned kFrame = 1, kReference = 2, kMeasured = 4, kArm = 8, kDisarm 
 const Experiment& experiment() {
   static const Experiment loaded = [] {
     Experiment one = load_experiment(kConfigFolder / "one_segment.yaml");
-    one.daemon.safety.good_frames = 2;
+    one.safety.good_frames = 2;
     return one;
   }();
   return loaded;
@@ -75,8 +75,8 @@ MocapFrame take_frame(Source& source, ClockRelation& clock, std::int64_t now_ns)
 
 void check(const PressureVector& before, const TickOutput& output) {
   const ActuationSettings& limits = experiment().actuation;
-  const double step = std::max(limits.slew_bar_per_s, limits.vent_bar_per_s) /
-                      experiment().daemon.rate_hz * (1.0 + 1e-9);
+  const double step =
+      std::max(limits.slew_bar_per_s, limits.vent_bar_per_s) / experiment().rate_hz * (1.0 + 1e-9);
   for (Eigen::Index j = 0; j < output.pressure_bar.size(); ++j) {
     const double bar = output.pressure_bar[j];
     require(bar >= 0.0 && bar <= limits.max_pressure_bar, "pressures stay within their limits");

@@ -3,8 +3,8 @@
 
 #include "fuzz/memory_file.hpp"
 #include "fuzz/target.hpp"
-#include "recording/recording_import.hpp"
 #include "softarm/config/config_error.hpp"
+#include "softarm/recording/recording_import.hpp"
 #include "softarm/transport/event_log.hpp"
 
 namespace softarm::test {

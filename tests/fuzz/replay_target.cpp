@@ -4,7 +4,8 @@
 
 #include "fuzz/target.hpp"
 #include "integration/replay/recorded_log.hpp"
-#include "replay/replay.hpp"
+#include "softarm/recording/replay.hpp"
+#include "softarm/transport/settings.hpp"
 #include "unit/config/config_files.hpp"
 
 namespace softarm::test {
@@ -35,7 +36,7 @@ void run_replay(std::span<const std::byte> input) {
   std::int64_t events = 0;
   Bytes record;
   for (LogEvent event; log.next(event); ++events) {
-    if (event.channel == experiment().daemon.lcm.tick_channel) {
+    if (event.channel == experiment().transport.lcm.tick_channel) {
       record = to_bytes(event.data);
       put_digest(record);
       event.data = record;

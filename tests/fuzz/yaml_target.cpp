@@ -6,7 +6,7 @@
 #include "fuzz/memory_file.hpp"
 #include "fuzz/target.hpp"
 #include "softarm/config/load.hpp"
-#include "softarm/daemon/control_pipeline.hpp"
+#include "softarm/runtime/control_pipeline.hpp"
 #include "unit/config/config_files.hpp"
 
 namespace softarm::test {

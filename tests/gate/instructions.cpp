@@ -5,7 +5,7 @@
 
 #include <cstdio>
 
-#include "bench/methods.hpp"
+#include "dev/bench/methods.hpp"
 
 namespace softarm {
 namespace {

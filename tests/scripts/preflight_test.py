@@ -66,9 +66,9 @@ class Arm:
         return self.start("motion capture at", "softarm-plant", *arguments, self.config("plant", daemon=daemon))
 
     def spoilt_plant(self, fault, *arguments):
-        """With softarm-fault between its sensors and us."""
+        """With softarm-dev fault between its sensors and us."""
         self.plant("--sensor-suffix", "_CLEAN")
-        self.start("", "softarm-fault", self.config("relay"), fault, "--after", "0", "--for", "100", *arguments)
+        self.start("", "softarm-dev", "fault", self.config("relay"), fault, "--after", "0", "--for", "100", *arguments)
 
     def check(self, config, *arguments):
         """Exit code and report."""
@@ -137,7 +137,7 @@ def jitter(test):
     arm.plant("--sensor-suffix", "_CLEAN")
     config = arm.config("lab")
     config.write_text(config.read_text(encoding="utf-8").replace("hold_after_s: 1", "hold_after_s: 0.1"), encoding="utf-8")
-    arm.start("", "softarm-fault", arm.config("relay"), "delay", "--amount", "0.5", "--after", "2", "--for", "0.5")
+    arm.start("", "softarm-dev", "fault", arm.config("relay"), "delay", "--amount", "0.5", "--after", "2", "--for", "0.5")
     return arm.check(config, "--seconds", "5")
 
 

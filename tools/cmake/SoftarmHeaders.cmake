@@ -1,13 +1,13 @@
 # softarm_precompile(KIND TARGETS...): with SOFTARM_PRECOMPILED_HEADERS the heavy headers of other projects are compiled once a
-# KIND (room, program or test) instead of once a file: a third of the time of a first build. Every file includes what it
+# KIND (module, program or test) instead of once a file: a third of the time of a first build. Every file includes what it
 # uses all the same: the sanitizers' and the debugging presets build without.
 option(SOFTARM_PRECOMPILED_HEADERS "Compile the headers of Eigen, fmt, CLI11 and GoogleTest once, not once a file" OFF)
 
-set(SOFTARM_ROOM_HEADERS
+set(SOFTARM_MODULE_HEADERS
   <Eigen/Core> <Eigen/Geometry> <fmt/format.h> <algorithm> <array> <cmath> <filesystem> <functional> <limits> <memory> <numbers>
   <optional> <span> <stdexcept> <string> <vector>)
-set(SOFTARM_PROGRAM_HEADERS ${SOFTARM_ROOM_HEADERS} <CLI/CLI.hpp> <yaml-cpp/yaml.h>)
-set(SOFTARM_TEST_HEADERS ${SOFTARM_ROOM_HEADERS} <gtest/gtest.h> <fstream> <random>)
+set(SOFTARM_PROGRAM_HEADERS ${SOFTARM_MODULE_HEADERS} <CLI/CLI.hpp> <yaml-cpp/yaml.h>)
+set(SOFTARM_TEST_HEADERS ${SOFTARM_MODULE_HEADERS} <gtest/gtest.h> <fstream> <random>)
 
 function(softarm_precompile kind)
   if(NOT SOFTARM_PRECOMPILED_HEADERS)
@@ -32,7 +32,7 @@ endfunction()
 function(softarm_headers_owner kind owner)
   set(source ${PROJECT_BINARY_DIR}/generated/precompiled/${kind}.cpp)
   file(CONFIGURE OUTPUT ${source} CONTENT "int main() { return 0; }\n")
-  if(kind STREQUAL "room")
+  if(kind STREQUAL "module")
     add_library(${owner} OBJECT ${source})
   else()
     add_executable(${owner} ${source})

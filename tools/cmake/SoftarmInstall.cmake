@@ -1,7 +1,7 @@
 # find_package(softarm) works from another project: softarm::model, softarm::control, ...
 include(CMakePackageConfigHelpers)
-get_property(rooms GLOBAL PROPERTY SOFTARM_ROOMS)
-install(TARGETS ${rooms} EXPORT softarmTargets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
+get_property(modules GLOBAL PROPERTY SOFTARM_MODULES)
+install(TARGETS ${modules} EXPORT softarmTargets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
 install(DIRECTORY include/softarm DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
 install(DIRECTORY ${SOFTARM_GENERATED_DIR}/lcmtypes/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} FILES_MATCHING PATTERN "*.hpp")
 install(DIRECTORY config/ DESTINATION ${CMAKE_INSTALL_DATADIR}/softarm/config FILES_MATCHING PATTERN "*.yaml"
@@ -16,13 +16,13 @@ install(FILES ${PROJECT_BINARY_DIR}/softarmConfig.cmake ${PROJECT_BINARY_DIR}/so
   DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/softarm)
 install(PROGRAMS tools/plot_run.py tools/plot_identification.py DESTINATION ${CMAKE_INSTALL_DATADIR}/softarm)
 install(FILES tests/golden/golden.json DESTINATION ${CMAKE_INSTALL_DATADIR}/softarm)
-install(FILES README.md DESTINATION ${CMAKE_INSTALL_DOCDIR})
-install(DIRECTORY docs DESTINATION ${CMAKE_INSTALL_DOCDIR} FILES_MATCHING PATTERN "*.md" PATTERN "*.png" PATTERN "*.svg" PATTERN "*.py"
-  PATTERN "drawings.py" EXCLUDE)
+install(FILES README.md CONTRIBUTING.md CHANGELOG.md DESTINATION ${CMAKE_INSTALL_DOCDIR})
+install(DIRECTORY docs DESTINATION ${CMAKE_INSTALL_DOCDIR} FILES_MATCHING PATTERN "*.md" PATTERN "*.png" PATTERN "*.svg")
+install(DIRECTORY examples DESTINATION ${CMAKE_INSTALL_DOCDIR} FILES_MATCHING PATTERN "*.py" PATTERN "*.cpp" PATTERN "__pycache__" EXCLUDE)
 install(DIRECTORY tools/plotting DESTINATION ${CMAKE_INSTALL_DATADIR}/softarm
   FILES_MATCHING PATTERN "*.py" PATTERN "__pycache__" EXCLUDE)
-# systemd units: softarmd@NAME, softarm-valves@NAME (docs/service.md).
-install(FILES docs/service.md DESTINATION ${CMAKE_INSTALL_DOCDIR}/docs COMPONENT units)
+# systemd units: softarmd@NAME, softarm-valves@NAME (docs/how-to/run_as_a_service.md).
+install(FILES docs/how-to/run_as_a_service.md DESTINATION ${CMAKE_INSTALL_DOCDIR}/docs/how-to COMPONENT units)
 install(CODE "set(SOFTARM_UNITS \"${PROJECT_SOURCE_DIR}/config/systemd\")
 set(SOFTARM_BIN \"${CMAKE_INSTALL_BINDIR}\")
 set(SOFTARM_DOC \"${CMAKE_INSTALL_DOCDIR}\")" COMPONENT units)

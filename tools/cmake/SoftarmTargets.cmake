@@ -1,7 +1,7 @@
-# softarm_room(NAME sources... [DEPENDS rooms/libraries] [PRIVATE_DEPENDS libraries]): one library a room of the house, so
-# that the linker enforces which way the arrows point. softarm_program(NAME sources... DEPENDS ...): one executable.
-# softarm_tests(LABEL ROOM [ALONE] [SLOW FILTER] DEPENDS ...): one test program from every *_test.cpp in the folder ROOM;
-# ALONE for tests in real time, which nothing may run beside; those whose names FILTER fits get the label slow instead.
+# softarm_module(NAME DEPENDS libraries PRIVATE_DEPENDS libraries): a module of the tree, a library of its own, so that the linker
+# sees which way the arrows point too. softarm_program(NAME DEPENDS ...): an executable.
+# softarm_tests(LABEL MODULE [ALONE] [SLOW FILTER] DEPENDS ...): one test program from every *_test.cpp below the folder MODULE;
+# ALONE for tests in real time, which nothing may run beside; those whose names FILTER matches get the label slow instead.
 
 include(SoftarmHeaders)
 
@@ -24,25 +24,36 @@ if(SOFTARM_SANITIZE)
   add_link_options(-fsanitize=${SOFTARM_SANITIZE})
 endif()
 
-function(softarm_room name)
-  cmake_parse_arguments(ROOM "" "" "DEPENDS;PRIVATE_DEPENDS" ${ARGN})
-  add_library(softarm_${name} STATIC ${ROOM_UNPARSED_ARGUMENTS})
+# softarm::NAME from the sources in src/NAME; the modules that it may include, and hence links, stand in src/modules.txt.
+file(STRINGS ${PROJECT_SOURCE_DIR}/src/modules.txt SOFTARM_ARROWS REGEX "^[a-z]+:")
+set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/modules.txt)
+function(softarm_module name)
+  cmake_parse_arguments(MODULE "" "" "DEPENDS;PRIVATE_DEPENDS" ${ARGN})
+  file(GLOB_RECURSE sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/${name}/*.cpp)
+  set(arrows ${SOFTARM_ARROWS})
+  list(FILTER arrows INCLUDE REGEX "^${name}:")
+  string(REGEX REPLACE "^${name}: *" "" arrows "${arrows}")
+  string(REPLACE " " ";" arrows "${arrows}")
+  list(TRANSFORM arrows PREPEND softarm::)
+  add_library(softarm_${name} STATIC ${sources})
   add_library(softarm::${name} ALIAS softarm_${name})
   set_target_properties(softarm_${name} PROPERTIES EXPORT_NAME ${name})
   target_include_directories(softarm_${name}
     PUBLIC $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/include> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>
     PRIVATE ${PROJECT_SOURCE_DIR}/src)
   target_compile_features(softarm_${name} PUBLIC cxx_std_20)
-  target_link_libraries(softarm_${name} PUBLIC ${ROOM_DEPENDS} PRIVATE ${ROOM_PRIVATE_DEPENDS} $<BUILD_INTERFACE:softarm_options>)
-  set_property(GLOBAL APPEND PROPERTY SOFTARM_ROOMS softarm_${name})
-  softarm_precompile(room softarm_${name})
+  target_link_libraries(softarm_${name} PUBLIC ${arrows} ${MODULE_DEPENDS}
+    PRIVATE ${MODULE_PRIVATE_DEPENDS} $<BUILD_INTERFACE:softarm_options>)
+  set_property(GLOBAL APPEND PROPERTY SOFTARM_MODULES softarm_${name})
+  softarm_precompile(module softarm_${name})
 endfunction()
 
+# The program NAME from the sources in src/apps/NAME.
 function(softarm_program name)
   cmake_parse_arguments(PROGRAM "" "" "DEPENDS" ${ARGN})
-  add_executable(${name} ${PROGRAM_UNPARSED_ARGUMENTS})
-  target_include_directories(${name} PRIVATE ${PROJECT_SOURCE_DIR}/src ${PROJECT_SOURCE_DIR}/tools)
-  target_link_libraries(${name} PRIVATE ${PROGRAM_DEPENDS} softarm_options)
+  file(GLOB_RECURSE sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/${name}/*.cpp)
+  add_executable(${name} ${sources})
+  target_link_libraries(${name} PRIVATE softarm_program_frame ${PROGRAM_DEPENDS} softarm_options)
   softarm_precompile(program ${name})
   install(TARGETS ${name} RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
 endfunction()
@@ -55,13 +66,13 @@ function(softarm_optimise_test target)
   endif()
 endfunction()
 
-function(softarm_tests label room)
+function(softarm_tests label module)
   cmake_parse_arguments(TESTS "ALONE" "SLOW" "DEPENDS" ${ARGN})
-  file(GLOB sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/${room}/*_test.cpp)
+  file(GLOB_RECURSE sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/${module}/*_test.cpp)
   if(NOT sources)
     return()
   endif()
-  set(target ${label}_${room}_tests)
+  set(target ${label}_${module}_tests)
   add_executable(${target} ${sources})
   target_include_directories(${target} PRIVATE ${PROJECT_SOURCE_DIR}/src ${PROJECT_SOURCE_DIR}/tools ${PROJECT_SOURCE_DIR}/tests)
   target_link_libraries(${target} PRIVATE ${TESTS_DEPENDS} GTest::gtest_main softarm_options)
@@ -72,10 +83,10 @@ function(softarm_tests label room)
   set(usual "*")
   if(TESTS_SLOW)
     set(usual "-${TESTS_SLOW}")
-    gtest_discover_tests(${target} TEST_PREFIX "${label}.${room}." PROPERTIES LABELS slow TIMEOUT 300
+    gtest_discover_tests(${target} TEST_PREFIX "${label}.${module}." PROPERTIES LABELS slow TIMEOUT 300
       RUN_SERIAL ${TESTS_ALONE} TEST_FILTER ${TESTS_SLOW} TEST_LIST ${target}_slow
       DISCOVERY_TIMEOUT 60 NO_PRETTY_TYPES NO_PRETTY_VALUES)
   endif()
-  gtest_discover_tests(${target} TEST_PREFIX "${label}.${room}." PROPERTIES LABELS ${label} TIMEOUT 300
+  gtest_discover_tests(${target} TEST_PREFIX "${label}.${module}." PROPERTIES LABELS ${label} TIMEOUT 300
     RUN_SERIAL ${TESTS_ALONE} TEST_FILTER ${usual} DISCOVERY_TIMEOUT 60 NO_PRETTY_TYPES NO_PRETTY_VALUES)
 endfunction()

@@ -4,9 +4,11 @@
 #include <cstdint>
 #include <string>
 
+#include "softarm/base/realtime.hpp"
 #include "softarm/config/identification_settings.hpp"
-#include "softarm/daemon/pipeline_settings.hpp"
-#include "softarm/plant/settings.hpp"
+#include "softarm/runtime/settings.hpp"
+#include "softarm/simulation/settings.hpp"
+#include "softarm/transport/settings.hpp"
 #include "softarm/valves/settings.hpp"
 
 namespace softarm {
@@ -22,6 +24,8 @@ struct RunSettings {
 struct Experiment : PipelineSettings {
   std::string name;
   std::uint64_t seed = 1;
+  TransportSettings transport;
+  RealtimeSettings realtime;
   PlantSettings plant;
   ValveDriverSettings valves;
   RunSettings run;

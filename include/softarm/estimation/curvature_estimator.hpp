@@ -20,8 +20,7 @@ struct BodyNoise {
 };
 
 /// Noise of the n + 1 bodies of an arm, all alike, the base without noise where it is fixed.
-std::vector<BodyNoise> body_noise(const EstimationSettings& settings, int segments,
-                                  bool base_is_fixed);
+std::vector<BodyNoise> body_noise(const EstimationSettings& settings, int segments);
 
 /// What one frame says about every segment.
 struct CurvatureEstimate {

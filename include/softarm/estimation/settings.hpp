@@ -17,6 +17,7 @@ struct EstimationSettings {
   /// vector.
   double position_noise_m = 0.2e-3;
   double orientation_noise_rad = 3.5e-3;
+  bool base_is_fixed = false;            ///< the base is where arm.base says, not a measured body
   double filter_bandwidth_radps = 30.0;  ///< of the filter on u and u'
   int predicted_frames = 3;              ///< frames an occluded segment may be predicted for
 

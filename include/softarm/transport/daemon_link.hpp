@@ -10,11 +10,13 @@
 #include <softarm_messages/timing_t.hpp>
 #include <vector>
 
-#include "softarm/daemon/control_pipeline.hpp"
-#include "softarm/daemon/histogram.hpp"
+#include "softarm/base/histogram.hpp"
+#include "softarm/runtime/control_pipeline.hpp"
+#include "softarm/runtime/settings.hpp"
 #include "softarm/transport/lcm_node.hpp"
 #include "softarm/transport/mocap_source.hpp"
 #include "softarm/transport/output_messages.hpp"
+#include "softarm/transport/settings.hpp"
 #include "softarm/transport/tick_record.hpp"
 
 namespace softarm {
@@ -33,7 +35,8 @@ struct LoopTiming {
 class DaemonLink {
  public:
   /// @throws TransportError
-  DaemonLink(const PipelineSettings& settings, const Provenance& provenance, bool shadow);
+  DaemonLink(const PipelineSettings& settings, const TransportSettings& transport,
+             const Provenance& provenance, bool shadow);
 
   /// Handles what has arrived, a bounded number of messages. The frames it points to live until the
   /// next call.
@@ -66,7 +69,7 @@ class DaemonLink {
   std::int64_t arrival_ns(const ReceivedMessage& packet) const noexcept;
   bool command_expired(std::int64_t now_us) const noexcept;
 
-  DaemonSettings settings_;
+  LcmSettings lcm_;
   MocapSource mocap_;
   LcmNode node_;
   int dof_;
@@ -79,18 +82,16 @@ class DaemonLink {
   LiveReferenceInput reference_;
   TickInput input_;
   std::int64_t now_ns_ = 0;
-  std::int64_t wall_minus_monotonic_ns_ = 0;
-  std::int64_t previous_collect_ns_ = 0;
   std::int64_t newest_measurement_ns_;
   std::int64_t newest_go_ns_;
   std::int64_t go_sequence_;
   PressureVector measured_bar_;
-  std::int64_t newest_reference_ns_ = 0;
-  std::int64_t newest_operator_ns_ = 0;
+  std::int64_t newest_reference_ns_ = kNever;
+  std::int64_t newest_operator_ns_ = kNever;
   std::int64_t reference_sequence_;
   std::int64_t operator_sequence_;
   std::int64_t commands_ = 0;
-  std::int64_t sent_us_ = 0;  ///< the newest command, as it says itself
+  std::int64_t sent_us_ = kNever;  ///< the newest command, as it says itself
   std::int64_t malformed_ = 0;
   std::int64_t unsent_ = 0;
 

@@ -7,17 +7,16 @@
 #include <softarm_messages/rigid_transform_t.hpp>
 #include <vector>
 
-#include "softarm/daemon/settings.hpp"
 #include "softarm/estimation/mocap_frame.hpp"
 #include "softarm/model/arm.hpp"
 #include "softarm/transport/optitrack_frame.hpp"
+#include "softarm/transport/pose_convention.hpp"
+#include "softarm/transport/settings.hpp"
 
 namespace softarm {
 
-/// Picks the base and the segment ends out of whatever bodies a frame carries, and tells where
-/// their frames S_i are: with the position p and orientation R that were sent, A the rotation
-/// mocap.axes, s the unit, and the plate's t and E,
-///   R_world = A R E,  p_world = s A p + A R t.
+/// Picks the base and the segment ends out of whatever bodies a frame carries, and brings them to
+/// our world by their PoseConvention (mocap.unit, mocap.axes, and the poses of S_i on the bodies).
 /// A body that is absent counts as not seen. What is left at its default changes no bit.
 class MocapAdapter {
  public:
@@ -49,24 +48,14 @@ class MocapAdapter {
   bool base_is_fixed() const noexcept { return bodies_.base_id < 0; }
 
  private:
-  struct Plate {
-    bool given = false;
-    Eigen::Vector3d position_m = Eigen::Vector3d::Zero();
-    Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();
-  };
-  /// In the sender's unit, in the order w, x, y, z.
-  struct Sent {
-    Eigen::Vector3d position;
-    Eigen::Quaterniond orientation;
-  };
-
   template <class Number>
-  BodyPose seen(const Number* position, const Number* orientation, std::size_t body) const noexcept;
-  Sent sent(const BodyPose& pose, std::size_t body) const noexcept;
+  BodyPose read(const Number* position, const Number* orientation, bool valid,
+                std::size_t body) const noexcept;
   template <class Number>
-  void write(const Sent& sent, Number* position, Number* orientation) const noexcept;
-  template <class Bodies, class Read>
-  void pick(const Bodies& bodies, const Read& read, MocapFrame& frame) const noexcept;
+  void write(const BodyPose& pose, std::size_t body, Number* position,
+             Number* orientation) const noexcept;
+  template <class Bodies, class Pose>
+  void pick(const Bodies& bodies, const Pose& pose, MocapFrame& frame) const noexcept;
   int id(std::size_t body) const noexcept {
     return body == 0 ? bodies_.base_id : bodies_.segment_ids[body - 1];
   }
@@ -74,11 +63,7 @@ class MocapAdapter {
   BodySettings bodies_;
   BodyPose fixed_base_;
   bool xyzw_;
-  double unit_m_;
-  bool turned_;
-  Eigen::Quaterniond axes_;
-  Eigen::Matrix3d axes_matrix_;
-  std::vector<Plate> plate_;  // of the base, then of the segments' ends
+  std::vector<PoseConvention> convention_;  // of the base, then of the segments' ends
 };
 
 }  // namespace softarm

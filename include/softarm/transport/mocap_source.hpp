@@ -12,9 +12,11 @@
 #include <vector>
 
 #include "softarm/estimation/clock_relation.hpp"
+#include "softarm/runtime/settings.hpp"
 #include "softarm/transport/frame_assembler.hpp"
 #include "softarm/transport/lcm_node.hpp"
 #include "softarm/transport/mocap_adapter.hpp"
+#include "softarm/transport/settings.hpp"
 
 namespace softarm {
 
@@ -26,13 +28,14 @@ enum class MocapReceipt {
 };
 
 /// Channels that carry motion capture: one, or one a body (base first, where it is not fixed).
-std::vector<std::string> mocap_channels(const DaemonSettings& daemon);
+std::vector<std::string> mocap_channels(const TransportSettings& transport);
 
 /// Turns what arrives on `channels()` into frames, capture times included. Belongs to one thread;
 /// after construction it neither allocates nor throws.
 class MocapSource {
  public:
-  MocapSource(const DaemonSettings& daemon, const ArmParameters& arm);
+  MocapSource(const TransportSettings& transport, const SafetySettings& safety,
+              const ArmParameters& arm);
 
   /// To subscribe to; their places in this list are what `take` wants.
   const std::vector<std::string>& channels() const noexcept { return channels_; }
@@ -68,7 +71,7 @@ class MocapSource {
 /// Publishes frames in the configured source's messages.
 class MocapSender {
  public:
-  MocapSender(const DaemonSettings& daemon, const ArmParameters& arm);
+  MocapSender(const TransportSettings& transport, const ArmParameters& arm);
 
   /// @param sender_time_us of exposure, on any clock; also stands for the wall clock in utime
   void publish(LcmNode& node, const MocapFrame& frame, std::int64_t sender_time_us);

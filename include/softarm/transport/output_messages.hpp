@@ -7,7 +7,8 @@
 #include <softarm_messages/torque_command_t.hpp>
 #include <string>
 
-#include "softarm/daemon/control_pipeline.hpp"
+#include "softarm/runtime/control_pipeline.hpp"
+#include "softarm/runtime/settings.hpp"
 
 namespace softarm {
 

@@ -8,7 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "softarm/daemon/control_pipeline.hpp"
+#include "softarm/runtime/control_pipeline.hpp"
+#include "softarm/runtime/settings.hpp"
 #include "softarm/transport/output_messages.hpp"
 
 namespace softarm {

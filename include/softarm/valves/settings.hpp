@@ -1,4 +1,5 @@
-// What an experiment says about the valve terminal: where it is, its registers, when to doubt it.
+// What an experiment says about the valves: who drives them, where the terminal is, its registers,
+// what counts as a fault.
 #pragma once
 
 #include <array>
@@ -39,6 +40,8 @@ struct RegisterMap {
 
 /// Settings of softarm-valves.
 struct ValveDriverSettings {
+  std::string backend = "modbus";  ///< who drives the valves: a name of valve_backend_names()
+  std::string device;              ///< what a back end that is not on a network opens
   std::string host = "127.0.0.1";  ///< IPv4 address
   int port = 502;
   int unit_id = 1;

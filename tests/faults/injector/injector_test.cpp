@@ -4,10 +4,11 @@
 #include <cmath>
 #include <map>
 
-#include "fault/fault_injector.hpp"
+#include "dev/fault/fault_injector.hpp"
 #include "softarm/estimation/frame_validator.hpp"
 #include "softarm/model/kinematics.hpp"
 #include "softarm/transport/mocap_adapter.hpp"
+#include "softarm/transport/settings.hpp"
 
 namespace softarm {
 namespace {
@@ -42,7 +43,7 @@ class Injector : public ::testing::Test {
   /// Twenty healthy frames, then forty with the fault: how many verdicts of each kind these got.
   std::map<FrameVerdict, int> verdicts(const char* fault) const {
     const EstimationSettings settings;
-    FrameValidator validator(settings, arm, body_noise(settings, 3, false));
+    FrameValidator validator(settings, arm, body_noise(settings, 3));
     const MocapAdapter adapter(bodies, arm);
     FaultInjector injector;
     std::map<FrameVerdict, int> found;

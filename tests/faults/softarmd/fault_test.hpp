@@ -8,8 +8,9 @@
 #include <string>
 #include <vector>
 
-#include "fault/fault_relay.hpp"
+#include "dev/fault/fault_relay.hpp"
 #include "integration/processes/station.hpp"
+#include "softarm/base/realtime.hpp"
 #include "softarm/config/load.hpp"
 
 namespace softarm::test {
@@ -74,7 +75,7 @@ class FaultTest : public ::testing::TestWithParam<Machine>, protected Station {
     return station.start(loaded() ? "/chrt" : "softarm-plant", arguments);
   }
   std::unique_ptr<FaultRelay> start_relay(Station& station) const {
-    return std::make_unique<FaultRelay>(load_experiment(station.config_.string()).daemon.lcm,
+    return std::make_unique<FaultRelay>(load_experiment(station.config_.string()).transport.lcm,
                                         kSensorSuffix, loaded() ? kPlantPriority : 0);
   }
 
@@ -92,7 +93,7 @@ class FaultTest : public ::testing::TestWithParam<Machine>, protected Station {
     const Experiment experiment = load_experiment(station.config_.string());
     const ActuationSettings& actuation = experiment.actuation;
     const double step =
-        std::max(actuation.slew_bar_per_s, actuation.vent_bar_per_s) / experiment.daemon.rate_hz;
+        std::max(actuation.slew_bar_per_s, actuation.vent_bar_per_s) / experiment.rate_hz;
     EXPECT_TRUE(station.all_finite_);
     EXPECT_GE(station.lowest_, 0.0F);
     EXPECT_LE(station.highest_, static_cast<float>(actuation.max_pressure_bar));

@@ -7,8 +7,10 @@
 #include <iostream>
 #include <thread>
 
-#include "fault/hostile_packets.hpp"
+#include "dev/fault/hostile_packets.hpp"
 #include "faults/softarmd/fault_test.hpp"
+#include "softarm/base/clock.hpp"
+#include "softarm/base/time.hpp"
 
 namespace softarm {
 namespace {
@@ -68,7 +70,7 @@ TEST_P(HostileBytes, MalformedPacketsWithoutEndAreRefusedWhileTheArmIsControlled
   long memory_kb = 0;
   forget();
 
-  HostilePackets hostile(load_experiment(config_.string()).daemon.lcm, 3, 12, 20261122);
+  HostilePackets hostile(load_experiment(config_.string()).transport.lcm, 3, 12, 20261122);
   RawSender sender(url_);
   const std::int64_t start_ns = monotonic_now_ns();
   const int ticks_before = statuses_;
@@ -79,7 +81,7 @@ TEST_P(HostileBytes, MalformedPacketsWithoutEndAreRefusedWhileTheArmIsControlled
     // LCM's buffers grow to what they need first.
     if (memory_kb == 0 && sent > packets / 10) memory_kb = resident_kb(daemon->pid());
   }
-  const double passed_s = 1e-9 * static_cast<double>(monotonic_now_ns() - start_ns);
+  const double passed_s = to_seconds(monotonic_now_ns() - start_ns);
   EXPECT_TRUE(stays_active(*this)) << told() << daemon->printed();
   const int refused = status_.messages_malformed - before;
   const long grown_kb = resident_kb(daemon->pid()) - memory_kb;

@@ -4,8 +4,11 @@
 #include <chrono>
 #include <thread>
 
-#include "fault/raw_packets.hpp"
+#include "dev/fault/raw_packets.hpp"
 #include "faults/softarmd/fault_test.hpp"
+#include "softarm/base/clock.hpp"
+#include "softarm/base/time.hpp"
+#include "softarm/transport/settings.hpp"
 
 namespace softarm {
 namespace {
@@ -32,7 +35,7 @@ TEST_P(MessagesAndLimits, HostileBytesAndAFloodAreCountedAndHarmless) {
 
   ASSERT_TRUE(wait_for([&] { return under_pressure(); })) << told() << daemon->printed();
 
-  const LcmSettings lcm = load_experiment(config_.string()).daemon.lcm;
+  const LcmSettings lcm = load_experiment(config_.string()).transport.lcm;
   const std::vector<Packet> hostile = hostile_packets(lcm);
   RawSender sender(url_);
   const int before = status_.messages_malformed;
@@ -43,7 +46,7 @@ TEST_P(MessagesAndLimits, HostileBytesAndAFloodAreCountedAndHarmless) {
   }
   EXPECT_TRUE(wait_for([&] { return status_.messages_malformed > before + 200; })) << told();
   EXPECT_TRUE(stays_active(*this)) << told() << daemon->printed();
-  const double passed_s = 1e-9 * static_cast<double>(monotonic_now_ns() - start_ns);
+  const double passed_s = to_seconds(monotonic_now_ns() - start_ns);
   EXPECT_TRUE(wait_for([&] { return count(daemon->printed(), "malformed") > 0; }));
   EXPECT_LE(count(daemon->printed(), "malformed"), 2.0 + passed_s) << "told once a second at most";
 

@@ -3,10 +3,10 @@
 #include <cstdio>
 #include <softarm/actuation/pressure_allocator.hpp>
 #include <softarm/config/load.hpp>
-#include <softarm/daemon/control_pipeline.hpp>
-#include <softarm/modbus/modbus_terminal.hpp>
-#include <softarm/plant/arm_plant.hpp>
+#include <softarm/runtime/control_pipeline.hpp>
+#include <softarm/simulation/arm_plant.hpp>
 #include <softarm/transport/lcm_node.hpp>
+#include <softarm/valves/modbus_terminal.hpp>
 #include <softarm_messages/pressure_command_t.hpp>
 
 int main(int, char** arguments) try {

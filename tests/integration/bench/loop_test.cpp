@@ -1,5 +1,5 @@
-// softarm bench loop runs, measures daemon and rivals, and says so in JSON. How fast they are is
-// for people to look at.
+// softarm-dev bench loop runs, measures daemon and rivals, and says so in JSON. How fast they are
+// is for people to look at.
 #include <gtest/gtest.h>
 #include <yaml-cpp/yaml.h>
 
@@ -17,7 +17,8 @@ TEST(BenchLoop, MeasuresTheDaemonBesideItsRivals) {
   } catch (const TransportError& error) {
     GTEST_SKIP() << error.what();
   }
-  const test::Outcome outcome = test::run("bench loop --json --seconds 0.5 --rate 500 --busy 1");
+  const test::Outcome outcome =
+      test::run("bench loop --json --seconds 0.5 --rate 500 --busy 1", "softarm-dev");
   ASSERT_EQ(outcome.code, 0) << outcome.text;
   const std::size_t begin = outcome.text.find('{');
   ASSERT_NE(begin, std::string::npos) << outcome.text;

@@ -7,8 +7,8 @@
 #include <functional>
 #include <numbers>
 
-#include "lock_step.hpp"
 #include "softarm/config/load.hpp"
+#include "softarm/simulation/lock_step.hpp"
 
 namespace softarm {
 namespace {
@@ -32,10 +32,10 @@ struct Tracking {
 
 Tracking track(const Experiment& experiment, double duration_s, double from_s,
                const std::function<void(const LogRow&)>& look = {}) {
-  LockStep lock_step(experiment);
+  LockStep lock_step(experiment, experiment.plant);
   LogRow row;
   Tracking result;
-  const double period_s = 1.0 / experiment.daemon.rate_hz;
+  const double period_s = 1.0 / experiment.rate_hz;
   for (double t_s = 0.0; t_s < duration_s; t_s += period_s) {
     lock_step.step(row);
     if (look) look(row);
@@ -135,7 +135,7 @@ TEST(ClosedLoop, BendsBeyondNinetyDegrees) {
   experiment.plant.initial_u_rad = SegmentVector::Zero(2);
   experiment.actuation.segments.resize(1);
   experiment.plant.actuation.segments.resize(1);
-  experiment.daemon.bodies.segment_ids.resize(1);
+  experiment.transport.bodies.segment_ids.resize(1);
   experiment.control.kp.resize(2);
   experiment.control.kd.resize(2);
   experiment.control.ki.resize(2);
@@ -178,11 +178,11 @@ TEST(ClosedLoop, SilenceOfTheMotionCaptureHoldsThenVents) {
   // Dropouts so frequent that HOLD must happen, rare enough that the arm comes back.
   Experiment experiment = configured("paper_arm.yaml");
   experiment.plant.mocap.dropout_probability = 0.3;
-  experiment.daemon.safety.good_frames = 5;
+  experiment.safety.good_frames = 5;
   double hold_s = 0.0, largest_step_bar = 0.0;
   PressureVector previous;
   Mode mode = Mode::init;
-  const double period_s = 1.0 / experiment.daemon.rate_hz;
+  const double period_s = 1.0 / experiment.rate_hz;
   const Tracking tracking = track(experiment, 10.0, 0.0, [&](const LogRow& row) {
     if (row.mode == Mode::hold) {
       hold_s += period_s;
@@ -199,6 +199,29 @@ TEST(ClosedLoop, SilenceOfTheMotionCaptureHoldsThenVents) {
   EXPECT_GT(hold_s, 0.02);
   EXPECT_GT(tracking.active_s, 2.0);
   EXPECT_LE(largest_step_bar, experiment.actuation.slew_bar_per_s * period_s * (1.0 + 1e-9));
+}
+
+// An operator arms what waits for it, holds the dead-man button, and looks first before arming an
+// arm that has vented.
+TEST(ClosedLoop, WithExplicitArmingItIsArmedOnce) {
+  Experiment experiment = configured("paper_arm.yaml");
+  experiment.safety.arming = Arming::explicit_;
+  experiment.safety.valve_readback = experiment.safety.deadman = true;
+  EXPECT_GT(track(experiment, 3.0, 1.0).active_s, 2.5);
+
+  experiment.plant.mocap.dropout_probability = 0.8;
+  experiment.safety.good_frames = 1;
+  experiment.safety.vent_after_s = 0.02;
+  int activations = 0;
+  bool waits_for_arm = false;
+  Mode mode = Mode::init;
+  track(experiment, 10.0, 0.0, [&](const LogRow& row) {
+    activations += row.mode == Mode::active && mode != Mode::active && mode != Mode::hold ? 1 : 0;
+    waits_for_arm |= row.mode == Mode::vent && row.reason == Reason::waiting_for_arm;
+    mode = row.mode;
+  });
+  EXPECT_EQ(activations, 1);
+  EXPECT_TRUE(waits_for_arm);
 }
 
 }  // namespace

@@ -103,7 +103,7 @@ class Recorded : public softarm::test::ImportTest, public testing::WithParamInte
     softarm::EstimationSettings settings;
     settings.position_noise_m = 0.1e-3;
     settings.orientation_noise_rad = 5e-4;
-    softarm::FrameValidator validator(settings, arm, softarm::body_noise(settings, 1, false));
+    softarm::FrameValidator validator(settings, arm, softarm::body_noise(settings, 1));
     std::vector<Sample> samples;
     for (const auto& [time_us, message] : frames) {
       softarm::MocapFrame frame;

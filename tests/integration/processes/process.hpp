@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "child_process.hpp"
+#include "dev/child_process.hpp"
 
 namespace softarm::test {
 

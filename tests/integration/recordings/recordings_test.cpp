@@ -7,9 +7,9 @@
 #include <lcm/lcm-cpp.hpp>
 
 #include "integration/processes/process.hpp"
-#include "logged_run.hpp"
+#include "softarm/base/clock.hpp"
 #include "softarm/config/load.hpp"
-#include "softarm/daemon/realtime.hpp"
+#include "softarm/recording/logged_run.hpp"
 #include "softarm/transport/lcm_node.hpp"
 #include "softarm/transport/message_decoding.hpp"
 
@@ -177,8 +177,8 @@ TEST_F(Recordings, SineJudgedAsAHundredHertzStreamHoldsAndVentsAtItsGaps) {
   // 100 ms vent.
   const auto log = import("one_column_sine.csv", "sine_map.yaml");
   Experiment experiment = load_experiment(kSource / "config" / "recorded_sine.yaml");
-  experiment.daemon.safety.frame_period_s = 0.01;
-  experiment.daemon.safety.good_frames = 1;
+  experiment.safety.frame_period_s = 0.01;
+  experiment.safety.good_frames = 1;
   LoggedRun run(experiment, log);
   const auto times = new_frame_times(log);
   LogRow row;

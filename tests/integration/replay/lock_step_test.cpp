@@ -9,7 +9,7 @@
 #include <sstream>
 
 #include "integration/replay/recorded_log.hpp"
-#include "replay/replay.hpp"
+#include "softarm/recording/replay.hpp"
 #include "softarm/transport/message_decoding.hpp"
 
 namespace softarm {
@@ -95,7 +95,7 @@ TEST_F(LockStepReplay, WhatMemoryHeldBeforeMakesNoDifference) {
     std::vector<std::uint64_t> said;
     std::int64_t tick = 0;
     for (LogEvent event; log.next(event);) {
-      if (event.channel != experiment_.daemon.lcm.tick_channel) continue;
+      if (event.channel != experiment_.transport.lcm.tick_channel) continue;
       ASSERT_TRUE(decode(event.data, record));
       if (record.tick <= tick) continue;  // its repetition
       tick = record.tick;
@@ -124,7 +124,7 @@ TEST_F(LockStepReplay, TorquesAndShadowToo) {
 
 TEST_F(LockStepReplay, AFlippedBitInACommandIsFoundAndNamed) {
   std::vector<std::size_t> ends;
-  const auto commands = events_on(log_.bytes, experiment_.daemon.lcm.command_channel, ends);
+  const auto commands = events_on(log_.bytes, experiment_.transport.lcm.command_channel, ends);
   std::string other = log_.bytes;
   other[ends[899] - 4 * 12 + 4 * 7 + 3] ^= 1;  // the last bit of pressure 7 of 12
   const ReplaySummary summary = replay(other, experiment_).summary;
@@ -192,7 +192,7 @@ TEST_F(LockStepReplay, CutAndDamagedLogsAreUsedBeforeAndAfter) {
   EXPECT_EQ(cut.summary.records.different, 0);
 
   std::vector<std::size_t> ends;
-  const auto records = events_on(log_.bytes, experiment_.daemon.lcm.tick_channel, ends);
+  const auto records = events_on(log_.bytes, experiment_.transport.lcm.tick_channel, ends);
   // A record whose numbers are damaged is no input: its repetition serves.
   std::string numbers = log_.bytes;
   numbers[ends[1200] - 60] ^= 0x10;

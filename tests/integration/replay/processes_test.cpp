@@ -9,9 +9,10 @@
 #include <functional>
 
 #include "integration/processes/process.hpp"
+#include "softarm/base/clock.hpp"
+#include "softarm/base/time.hpp"
 #include "softarm/config/load.hpp"
-#include "softarm/daemon/realtime.hpp"
-#include "softarm/daemon/safety_monitor.hpp"
+#include "softarm/runtime/safety_monitor.hpp"
 #include "softarm/transport/event_log.hpp"
 #include "softarm/transport/lcm_node.hpp"
 #include "softarm/transport/message_decoding.hpp"
@@ -38,7 +39,7 @@ class ReplayOfProcesses : public ::testing::Test {
     url_ = "udpm://239.255.76.67:" + std::to_string(20000 + getpid() % 40000) + "?ttl=0";
     config_ = folder_ / "config.yaml";
     log_ = folder_ / "log";
-    experiment_.daemon.lcm.url = url_;
+    experiment_.transport.lcm.url = url_;
     std::ofstream(config_) << resolved_text(
         experiment_);  // all of it: nothing may change meanwhile
     try {
@@ -59,7 +60,7 @@ class ReplayOfProcesses : public ::testing::Test {
                                      folder_ / ("printed" + std::to_string(started_++)));
   }
   bool wait_for(const std::function<bool()>& reached, double patience_s = 20.0) {
-    const std::int64_t end_ns = monotonic_now_ns() + static_cast<std::int64_t>(patience_s * 1e9);
+    const std::int64_t end_ns = monotonic_now_ns() + to_ns(patience_s);
     while (monotonic_now_ns() < end_ns) {
       if (reached()) return true;
       node_->wait_until(monotonic_now_ns() + kSecond / 100);
@@ -86,7 +87,7 @@ class ReplayOfProcesses : public ::testing::Test {
     })) << logger->printed();
     const auto daemon = start("softarmd", {config_});
     ASSERT_TRUE(reach(Mode::active)) << daemon->printed();
-    const std::int64_t end_ns = monotonic_now_ns() + static_cast<std::int64_t>(1e9 * seconds);
+    const std::int64_t end_ns = monotonic_now_ns() + to_ns(seconds);
     do {
       go_on(0.3);
       daemon->signal(SIGSTOP);
@@ -205,7 +206,7 @@ TEST_F(ReplayOfProcesses, RecordedWithFaultsIsBitExactAndDamageIsTold) {
   EXPECT_NE(printed_.find("INCOMPLETE"), std::string::npos) << printed_;
 
   // Another configuration.
-  experiment_.daemon.rate_hz = 400.0;
+  experiment_.rate_hz = 400.0;
   std::ofstream(config_) << resolved_text(experiment_);
   EXPECT_EQ(replay(), 78) << printed_;
   EXPECT_NE(printed_.find("--any-configuration"), std::string::npos);

@@ -7,9 +7,11 @@
 #include <string>
 #include <vector>
 
+#include "softarm/base/time.hpp"
 #include "softarm/config/load.hpp"
-#include "softarm/plant/simulated_arm.hpp"
+#include "softarm/simulation/simulated_arm.hpp"
 #include "softarm/transport/output_messages.hpp"
+#include "softarm/transport/settings.hpp"
 #include "softarm/transport/tick_record.hpp"
 
 namespace softarm::test {
@@ -59,7 +61,7 @@ struct RecordedRun {
 inline RecordedRun record_run(const Experiment& experiment, double seconds, bool shadow,
                               LogBytes& log, const Losses& losses = {},
                               std::int64_t start_ns = 7'000'000'000) {
-  const LcmSettings& lcm = experiment.daemon.lcm;
+  const LcmSettings& lcm = experiment.transport.lcm;
   const Provenance provenance{
       .version = "test", .configuration_hash = experiment.hash, .seed = 1, .build = "this build"};
   ControlPipeline pipeline(experiment);
@@ -74,7 +76,7 @@ inline RecordedRun record_run(const Experiment& experiment, double seconds, bool
     return !bytes.empty();
   };
   const std::int64_t period_ns = pipeline.period_ns();
-  const auto ticks = static_cast<std::int64_t>(1e9 * seconds) / period_ns;
+  const auto ticks = to_ns(seconds) / period_ns;
   const SegmentVector zero = SegmentVector::Zero(experiment.arm.dof());
   const LiveReferenceInput reference{zero, zero, zero};
   for (std::int64_t k = 1; k <= ticks; ++k) {

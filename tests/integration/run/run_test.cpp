@@ -109,6 +109,30 @@ TEST_F(Run, LeavesWhatItPromises) {
   EXPECT_EQ(rows, 1500u);
 }
 
+// As softarmd with an operator beside it, and not for 20 s of WAIT_FRAMES and exit code 0.
+TEST_F(Run, WithExplicitArmingTheArmIsArmed) {
+  const std::string config =
+      write("explicit.yaml", "include: " + kPaperArm +
+                                 "\nname: explicit\ndaemon:\n  lcm: {deadman_channel: GO}\n"
+                                 "  safety: {arming: explicit, valve_readback: true}\n");
+  const std::string out = (folder / "out").string();
+  ASSERT_EQ(start("softarm", {"run", config, "--duration", "3", "--no-plots", "--out", out}), 0)
+      << printed;
+  EXPECT_GT(YAML::Load(read(folder / "out" / "summary.json"))["modes"]["ACTIVE"].as<double>(-1.0),
+            2.5);
+}
+
+TEST_F(Run, AnArmThatWasNeverActiveIsAFailureWithItsReason) {
+  const std::string out = (folder / "out").string();
+  EXPECT_EQ(start("softarm", {"run", kPaperArm, "--duration", "0.1", "--no-plots", "--out", out}),
+            1)
+      << printed;
+  for (const char* part :
+       {"never ACTIVE", "WAIT_FRAMES", "waiting_for_frames", "safety.good_frames"})
+    EXPECT_NE(printed.find(part), std::string::npos) << part << " in\n" << printed;
+  EXPECT_TRUE(std::filesystem::exists(folder / "out" / "summary.json"));
+}
+
 TEST_F(Run, WrongCommandLinesExitWith64) {
   const std::vector<std::vector<std::string>> wrong{
       {},

@@ -6,9 +6,9 @@
 #include <fstream>
 #include <stdexcept>
 
-#include "identification/coverage.hpp"
-#include "identification/linear_fit.hpp"
 #include "integration/processes/process.hpp"
+#include "softarm/commissioning/identification/coverage.hpp"
+#include "softarm/commissioning/identification/linear_fit.hpp"
 #include "softarm/config/load.hpp"
 
 namespace softarm {

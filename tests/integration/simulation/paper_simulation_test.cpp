@@ -4,9 +4,9 @@
 #include <cmath>
 #include <filesystem>
 
-#include "lock_step.hpp"
-#include "shape_log.hpp"
 #include "softarm/config/load.hpp"
+#include "softarm/recording/shape_log.hpp"
+#include "softarm/simulation/lock_step.hpp"
 
 namespace softarm {
 namespace {
@@ -24,12 +24,12 @@ struct TipTracking {
 
 template <class Look>
 TipTracking track(const Experiment& experiment, double duration_s, Look&& look) {
-  LockStep lock_step(experiment);
+  LockStep lock_step(experiment, experiment.plant);
   LogRow row;
   TipTracking result;
   double squared = 0.0;
   int counted = 0;
-  const double period_s = 1.0 / experiment.daemon.rate_hz;
+  const double period_s = 1.0 / experiment.rate_hz;
   for (double t_s = 0.0; t_s < duration_s; t_s += period_s) {
     lock_step.step(row);
     look(row, lock_step);
@@ -104,7 +104,7 @@ Experiment on_the_model(Experiment experiment) {
 TEST(PaperSimulation, AHoldFreezesTheReferenceAndItStartsAnewWhereTheArmIs) {
   Experiment experiment = on_the_model(configured("paper_simulation_noisy.yaml"));
   experiment.plant.mocap.dropout_probability = 0.25;
-  experiment.daemon.safety.good_frames = 5;
+  experiment.safety.good_frames = 5;
   Mode before = Mode::init;
   int returns = 0;
   PressureVector held;

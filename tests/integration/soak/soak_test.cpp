@@ -34,9 +34,9 @@ class Soak : public ::testing::Test {
   }
 
   std::unique_ptr<Process> start(std::vector<std::string> more) {
-    more.insert(more.begin(), {SOFTARM_SOURCE_DIR "/config/paper_arm.yaml", "--json", "--out",
-                               (folder / "out").string()});
-    return std::make_unique<Process>("softarm-soak", more, (folder / "printed").string());
+    more.insert(more.begin(), {"soak", SOFTARM_SOURCE_DIR "/config/paper_arm.yaml", "--json",
+                               "--out", (folder / "out").string()});
+    return std::make_unique<Process>("softarm-dev", more, (folder / "printed").string());
   }
   /// The JSON at the end of what it printed.
   static YAML::Node counters(const Process& process) {

@@ -9,8 +9,8 @@
 #include <cmath>
 #include <random>
 
-#include "bench/accuracy.hpp"
-#include "bench/kdl_chain.hpp"
+#include "dev/bench/accuracy.hpp"
+#include "dev/bench/kdl_chain.hpp"
 #include "softarm/model/dynamics.hpp"
 #include "softarm/model/polar.hpp"
 

@@ -1,5 +1,5 @@
-// What `softarm bench model` measures, and how it counts.
-#include "bench/methods.hpp"
+// What `softarm-dev bench model` measures, and how it counts.
+#include "dev/bench/methods.hpp"
 
 #include <gtest/gtest.h>
 
@@ -7,8 +7,8 @@
 #include <limits>
 #include <string>
 
-#include "bench/accuracy.hpp"
-#include "bench/interleaved.hpp"
+#include "dev/bench/accuracy.hpp"
+#include "dev/bench/interleaved.hpp"
 
 namespace softarm {
 namespace {

@@ -6,11 +6,12 @@
 #include <algorithm>
 #include <cmath>
 
-#include "bench/control_bench.hpp"
-#include "bench/control_trials.hpp"
+#include "dev/bench/control_bench.hpp"
+#include "dev/bench/control_trials.hpp"
 #include "softarm/config/load.hpp"
 #include "softarm/control/gain_check.hpp"
 #include "softarm/model/dynamics.hpp"
+#include "softarm/model/statics.hpp"
 
 namespace softarm {
 namespace {
@@ -30,7 +31,7 @@ Experiment with_gains(Experiment experiment, double kp, double kd = 0.0) {
 VectorXd straight(const Experiment& experiment) { return VectorXd::Zero(experiment.arm.dof()); }
 
 LoopSampling sampling_of_plant(const Experiment& experiment) {
-  return {.control_period_s = 1.0 / experiment.daemon.rate_hz,
+  return {.control_period_s = 1.0 / experiment.rate_hz,
           .frame_period_s = 1.0 / experiment.plant.mocap.rate_hz,
           .frame_latency_s = experiment.plant.mocap.latency_s,
           .filter_bandwidth_radps = experiment.estimation.filter_bandwidth_radps,
@@ -61,7 +62,7 @@ TEST(SampledLoop, TheoryAndSimulationLoseStabilityTogether) {
     Experiment experiment = with_gains(configured("paper_arm.yaml"), 1.0);
     experiment.plant.valves.lag_s = experiment.control.valve_lag_s = each.lag_s;
     experiment.plant.valves.dead_time_s = each.dead_time_s;
-    experiment.daemon.rate_hz = each.rate_hz;
+    experiment.rate_hz = each.rate_hz;
     experiment.estimation.filter_bandwidth_radps = each.bandwidth_radps;
     const double limit = limit_of(experiment);
     EXPECT_GT(limit, 0.3);

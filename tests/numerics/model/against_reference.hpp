@@ -15,7 +15,7 @@
 #include <limits>
 #include <vector>
 
-#include "reference_model.hpp"
+#include "dev/reference_model/reference_model.hpp"
 #include "softarm/model/dynamics.hpp"
 #include "softarm/model/kinematics.hpp"
 #include "unit/model/random_arm.hpp"

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "reference_model.hpp"
+#include "dev/reference_model/reference_model.hpp"
 #include "softarm/control/curvature_controller.hpp"
 #include "softarm/model/dynamics.hpp"
 #include "unit/model/random_arm.hpp"

@@ -8,8 +8,8 @@
 #include <limits>
 #include <numbers>
 
+#include "dev/reference_model/reference_model.hpp"
 #include "model/arc_moments.hpp"
-#include "reference_model.hpp"
 #include "softarm/model/dynamics.hpp"
 #include "softarm/model/kinematics.hpp"
 #include "unit/model/random_arm.hpp"

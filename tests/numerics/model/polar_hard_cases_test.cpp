@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "reference_model.hpp"
+#include "dev/reference_model/reference_model.hpp"
 #include "softarm/model/dynamics.hpp"
 #include "softarm/model/polar.hpp"
 #include "unit/model/random_arm.hpp"

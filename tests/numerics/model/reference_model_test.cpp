@@ -1,6 +1,6 @@
 // The reference model must earn its name: golden numbers to the last place of a double, quadrature
 // that more nodes do not change, derivatives against differences in long double.
-#include "reference_model.hpp"
+#include "dev/reference_model/reference_model.hpp"
 
 #include <gtest/gtest.h>
 

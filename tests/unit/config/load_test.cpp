@@ -122,7 +122,7 @@ TEST(PaperArm, IsThatOfSectionVII) {
   EXPECT_EQ(e.actuation.segments[2][3].gain_nm_per_bar, 0.839);
   EXPECT_EQ(e.control.kp, std::vector<double>(6, 1.0));
   EXPECT_EQ(e.control.kd, std::vector<double>(6, 0.002));
-  EXPECT_EQ(e.daemon.rate_hz, 500.0);
+  EXPECT_EQ(e.rate_hz, 500.0);
   EXPECT_NEAR(e.plant.mocap.orientation_noise_rad, 0.2 * kPi / 180.0, 1e-18);
   EXPECT_EQ(e.plant.arm.mass, MassModel::distributed);
   ASSERT_EQ(e.reference.phases.size(), 1u);
@@ -145,7 +145,7 @@ TEST(PaperArm, VariantsDifferWhereTheySay) {
   const Experiment polar = shipped("paper_arm_polar.yaml");
   EXPECT_EQ(polar.control.coordinates, ControlCoordinates::polar);
   EXPECT_EQ(polar.control.kp, (std::vector<double>{1.2, 0.0, 1.1, 0.0, 1.0, 0.0}));
-  EXPECT_EQ(polar.daemon.rate_hz, 1000.0);
+  EXPECT_EQ(polar.rate_hz, 1000.0);
   EXPECT_EQ(polar.plant.valves.lag_s, 0.0);
 }
 
@@ -246,8 +246,8 @@ TEST(RoundTrip, RandomExperiments) {
     for (double& u : std::get<SetPointReference>(e.reference.phases[0].kind).u_rad)
       u = -unit(random);
     e.plant.initial_u_rad.setConstant(unit(random));
-    e.daemon.bodies.base_id = -1;
-    e.daemon.realtime.cpu = 1;
+    e.transport.bodies.base_id = -1;
+    e.realtime.cpu = 1;
     const Experiment again = load_text(resolved_text(e));
     EXPECT_EQ(resolved_text(e), resolved_text(again));
     EXPECT_EQ(e.name, again.name);
@@ -256,8 +256,8 @@ TEST(RoundTrip, RandomExperiments) {
     EXPECT_EQ(e.arm.segments[1].damping_nms_per_rad, again.arm.segments[1].damping_nms_per_rad);
     EXPECT_EQ(std::get<SetPointReference>(e.reference.phases[0].kind).u_rad,
               std::get<SetPointReference>(again.reference.phases[0].kind).u_rad);
-    EXPECT_EQ(again.daemon.bodies.base_id, -1);
-    EXPECT_EQ(again.daemon.realtime.cpu, 1);
+    EXPECT_EQ(again.transport.bodies.base_id, -1);
+    EXPECT_EQ(again.realtime.cpu, 1);
   }
 }
 

@@ -3,6 +3,7 @@
 
 #include "config_files.hpp"
 #include "softarm/config/load.hpp"
+#include "softarm/transport/settings.hpp"
 
 namespace softarm {
 namespace {
@@ -33,24 +34,24 @@ class MocapKeys : public ::testing::Test {
 };
 
 TEST_F(MocapKeys, LeftOutMeanOurOwnFrames) {
-  const DaemonSettings daemon = load("").daemon;
-  EXPECT_EQ(daemon.mocap.source, MocapSourceKind::softarm);
-  EXPECT_EQ(daemon.mocap.unit, LengthUnit::metre);
-  EXPECT_EQ(daemon.mocap.quaternion, QuaternionOrder::wxyz);
-  EXPECT_EQ(daemon.mocap.axes, Eigen::Matrix3d::Identity());
-  EXPECT_EQ(daemon.lcm.mocap_channel, "SOFTARM_MOCAP");
-  ASSERT_EQ(daemon.bodies.segment_plates.size(), 2U);
-  EXPECT_EQ(daemon.bodies.segment_plates[1], PlateSettings{});
+  const TransportSettings transport = load("").transport;
+  EXPECT_EQ(transport.mocap.source, MocapSourceKind::softarm);
+  EXPECT_EQ(transport.mocap.unit, LengthUnit::metre);
+  EXPECT_EQ(transport.mocap.quaternion, QuaternionOrder::wxyz);
+  EXPECT_EQ(transport.mocap.axes, Eigen::Matrix3d::Identity());
+  EXPECT_EQ(transport.lcm.mocap_channel, "SOFTARM_MOCAP");
+  ASSERT_EQ(transport.bodies.segment_plates.size(), 2U);
+  EXPECT_EQ(transport.bodies.segment_plates[1], PlateSettings{});
 }
 
 TEST_F(MocapKeys, ASourceBringsItsDefaults) {
-  DaemonSettings daemon = load("  mocap: {source: optitrack}\n").daemon;
-  EXPECT_EQ(daemon.lcm.mocap_channel, "OPTITRACK_FRAMES");
-  EXPECT_EQ(daemon.mocap.quaternion, QuaternionOrder::xyzw);
-  daemon = load("  mocap: {source: rigid_transform}\n").daemon;
-  EXPECT_EQ(daemon.mocap.quaternion, QuaternionOrder::wxyz);
-  EXPECT_EQ(body_channel(daemon.lcm, daemon.bodies.base_plate), "VICON_base");
-  EXPECT_EQ(body_channel(daemon.lcm, daemon.bodies.segment_plates[1]), "VICON_segment_2");
+  TransportSettings transport = load("  mocap: {source: optitrack}\n").transport;
+  EXPECT_EQ(transport.lcm.mocap_channel, "OPTITRACK_FRAMES");
+  EXPECT_EQ(transport.mocap.quaternion, QuaternionOrder::xyzw);
+  transport = load("  mocap: {source: rigid_transform}\n").transport;
+  EXPECT_EQ(transport.mocap.quaternion, QuaternionOrder::wxyz);
+  EXPECT_EQ(body_channel(transport.lcm, transport.bodies.base_plate), "VICON_base");
+  EXPECT_EQ(body_channel(transport.lcm, transport.bodies.segment_plates[1]), "VICON_segment_2");
 }
 
 TEST_F(MocapKeys, EverythingCanBeSaidAndSurvivesPrinting) {
@@ -65,16 +66,16 @@ TEST_F(MocapKeys, EverythingCanBeSaidAndSurvivesPrinting) {
   const Experiment again = load_experiment(folder.write("f.yaml", resolved_text(first)));
   EXPECT_EQ(resolved_text(first), resolved_text(again));
   for (const Experiment& experiment : {first, again}) {
-    const DaemonSettings& daemon = experiment.daemon;
-    EXPECT_EQ(daemon.mocap.unit, LengthUnit::millimetre);
-    EXPECT_EQ(daemon.mocap.quaternion, QuaternionOrder::xyzw);
+    const TransportSettings& transport = experiment.transport;
+    EXPECT_EQ(transport.mocap.unit, LengthUnit::millimetre);
+    EXPECT_EQ(transport.mocap.quaternion, QuaternionOrder::xyzw);
     // What is up there is up here.
-    EXPECT_EQ(daemon.mocap.axes * Eigen::Vector3d::UnitY(), Eigen::Vector3d::UnitZ());
-    EXPECT_EQ(daemon.mocap.axes * Eigen::Vector3d::UnitX(), Eigen::Vector3d::UnitX());
-    EXPECT_EQ(daemon.bodies.base_plate.name, "root");
-    EXPECT_EQ(daemon.bodies.base_plate.position_m, Eigen::Vector3d(0, 0.01, 0));
-    EXPECT_EQ(daemon.bodies.segment_plates[0].rotation_rad.z(), 3.141592653589793);
-    EXPECT_EQ(daemon.bodies.segment_plates[1].position_m, Eigen::Vector3d(1e-3, 2e-3, 3e-3));
+    EXPECT_EQ(transport.mocap.axes * Eigen::Vector3d::UnitY(), Eigen::Vector3d::UnitZ());
+    EXPECT_EQ(transport.mocap.axes * Eigen::Vector3d::UnitX(), Eigen::Vector3d::UnitX());
+    EXPECT_EQ(transport.bodies.base_plate.name, "root");
+    EXPECT_EQ(transport.bodies.base_plate.position_m, Eigen::Vector3d(0, 0.01, 0));
+    EXPECT_EQ(transport.bodies.segment_plates[0].rotation_rad.z(), 3.141592653589793);
+    EXPECT_EQ(transport.bodies.segment_plates[1].position_m, Eigen::Vector3d(1e-3, 2e-3, 3e-3));
   }
 }
 

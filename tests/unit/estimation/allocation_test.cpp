@@ -14,7 +14,7 @@ TEST(Estimation, AllocatesNothingAfterConstruction) {
   const int n = 40;
   const ArmParameters arm = test::arm_of(n);
   const EstimationSettings settings;
-  FrameValidator validator(settings, arm, body_noise(settings, n, true));
+  FrameValidator validator(settings, arm, test::fixed_base_noise(settings, n));
   CurvatureFilter filter(settings, n);
   ClockRelation clock(ClockMode::sender, 5e-3);
   KnownMotion known;

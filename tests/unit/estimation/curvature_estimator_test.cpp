@@ -22,7 +22,7 @@ CurvatureEstimator estimator_of(CurvatureMethod method, const ArmParameters& arm
                                 std::vector<BodyNoise> noise = {}) {
   EstimationSettings settings;
   settings.method = method;
-  if (noise.empty()) noise = body_noise(settings, arm.size(), true);
+  if (noise.empty()) noise = test::fixed_base_noise(settings, arm.size());
   return CurvatureEstimator(settings, arm, noise);
 }
 
@@ -166,12 +166,12 @@ TEST(CurvatureEstimator, WhatHasNoBendIsNotValid) {
 TEST(CurvatureEstimator, RefusesWrongSettings) {
   EstimationSettings settings;
   const ArmParameters arm = arm_of(2);
-  EXPECT_THROW(CurvatureEstimator(settings, arm, body_noise(settings, 3, true)),
+  EXPECT_THROW(CurvatureEstimator(settings, arm, test::fixed_base_noise(settings, 3)),
                std::invalid_argument);
-  EXPECT_THROW(CurvatureEstimator(settings, arm_of(0), body_noise(settings, 0, true)),
+  EXPECT_THROW(CurvatureEstimator(settings, arm_of(0), test::fixed_base_noise(settings, 0)),
                std::invalid_argument);
   settings.position_noise_m = -1.0;
-  EXPECT_THROW(CurvatureEstimator(settings, arm, body_noise(settings, 2, true)),
+  EXPECT_THROW(CurvatureEstimator(settings, arm, test::fixed_base_noise(settings, 2)),
                std::invalid_argument);
 }
 

@@ -19,7 +19,7 @@ class Validator : public testing::Test {
  protected:
   ArmParameters arm = arm_of(3);
   EstimationSettings settings;
-  FrameValidator validator{settings, arm, body_noise(settings, 3, false)};
+  FrameValidator validator{settings, arm, body_noise(settings, 3)};
   Eigen::VectorXd u = (Eigen::VectorXd(6) << 0.4, 0.1, -0.3, 0.2, 0.1, -0.5).finished();
 
   MocapFrame frame(std::int64_t number, std::int64_t capture_ns) const {
@@ -204,7 +204,7 @@ TEST(FrameValidator, InertialSensorsNeedNoPositions) {
   EstimationSettings settings;
   settings.method = CurvatureMethod::orientation;
   const ArmParameters arm = arm_of(2);
-  FrameValidator validator(settings, arm, body_noise(settings, 2, true));
+  FrameValidator validator(settings, arm, test::fixed_base_noise(settings, 2));
   MocapFrame frame = frame_of(arm, Eigen::VectorXd::Constant(4, 0.5));
   for (BodyPose& body : frame.body) body.position_m.setZero();
   EXPECT_EQ(validator.accept(frame), FrameVerdict::accepted);
@@ -216,7 +216,7 @@ TEST(FrameValidator, RefusesWrongTolerances) {
     double* const tolerance[] = {&settings.quaternion_tolerance, &settings.length_tolerance,
                                  &settings.max_speed_radps};
     *tolerance[k] = k == 1 ? std::numeric_limits<double>::quiet_NaN() : 0.0;
-    EXPECT_THROW(FrameValidator(settings, arm_of(1), body_noise(settings, 1, true)),
+    EXPECT_THROW(FrameValidator(settings, arm_of(1), test::fixed_base_noise(settings, 1)),
                  std::invalid_argument);
   }
 }

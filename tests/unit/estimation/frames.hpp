@@ -6,9 +6,16 @@
 #include <cmath>
 #include <random>
 
+#include "softarm/estimation/curvature_estimator.hpp"
 #include "softarm/estimation/mocap_frame.hpp"
 
 namespace softarm::test {
+
+/// Noise of the bodies where the base is not one of them.
+inline std::vector<BodyNoise> fixed_base_noise(EstimationSettings settings, int segments) {
+  settings.base_is_fixed = true;
+  return body_noise(settings, segments);
+}
 
 /// Pose of the end of a segment that bends by theta towards phi: an arc of radius L / theta.
 inline Eigen::Isometry3d arc_end(double length, double phi, double theta) {

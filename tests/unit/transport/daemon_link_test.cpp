@@ -9,8 +9,11 @@
 #include <thread>
 
 #include "counted_malloc.hpp"
-#include "softarm/daemon/realtime.hpp"
+#include "softarm/base/clock.hpp"
+#include "softarm/base/time.hpp"
+#include "softarm/runtime/settings.hpp"
 #include "softarm/transport/message_decoding.hpp"
+#include "softarm/transport/settings.hpp"
 #include "unit/transport/messages.hpp"
 
 namespace softarm {
@@ -27,18 +30,18 @@ class DaemonLinkOverUdp : public ::testing::Test {
     settings.control.kp.assign(6, 1.0);
     settings.control.kd.assign(6, 0.002);
     settings.reference.phases = {{LiveReference{}, 0.0}};
-    settings.daemon.bodies = {.base_id = 0, .segment_ids = {1, 2, 3}};
-    settings.daemon.safety.valve_readback = true;
-    settings.daemon.safety.pressure_tolerance_bar = 100.0;  // the messages here follow nobody
-    settings.daemon.lcm.deadman_channel = "SOFTARM_GO";
-    settings.daemon.lcm.url =
+    transport.bodies = {.base_id = 0, .segment_ids = {1, 2, 3}};
+    settings.safety.valve_readback = true;
+    settings.safety.pressure_tolerance_bar = 100.0;  // the messages here follow nobody
+    transport.lcm.deadman_channel = "SOFTARM_GO";
+    transport.lcm.url =
         "udpm://239.255.76.67:" + std::to_string(20000 + getpid() % 40000) + "?ttl=0";
   }
   void SetUp() override {
     try {
-      sender = std::make_unique<LcmNode>(settings.daemon.lcm.url);
-      link = std::make_unique<DaemonLink>(settings, Provenance{.version = "test", .build = "build"},
-                                          false);
+      sender = std::make_unique<LcmNode>(transport.lcm.url);
+      link = std::make_unique<DaemonLink>(settings, transport,
+                                          Provenance{.version = "test", .build = "build"}, false);
     } catch (const TransportError& error) {
       GTEST_SKIP() << error.what();
     }
@@ -73,6 +76,7 @@ class DaemonLinkOverUdp : public ::testing::Test {
   }
 
   PipelineSettings settings;
+  TransportSettings transport;
   std::unique_ptr<LcmNode> sender;
   std::unique_ptr<DaemonLink> link;
 };
@@ -80,7 +84,7 @@ class DaemonLinkOverUdp : public ::testing::Test {
 TEST_F(DaemonLinkOverUdp, TenThousandTicksAllocateNothing) {
   ControlPipeline pipeline(settings);
   LoopTiming timing;
-  const LcmSettings& lcm = settings.daemon.lcm;
+  const LcmSettings& lcm = transport.lcm;
   pressure_measurement_t measurement = test::example<pressure_measurement_t>(3, 4);
   curvature_reference_t reference = test::example<curvature_reference_t>(3, 4);
   operator_command_t operator_command{.sequence = 0, .request = operator_command_t::ARM};
@@ -134,13 +138,13 @@ TEST_F(DaemonLinkOverUdp, TenThousandTicksAllocateNothing) {
 TEST_F(DaemonLinkOverUdp, WhatWasDecidedBeforeTheValvesVentedIsNotSentAfterIt) {
   pressure_command_t heard{};
   int count = 0;
-  sender->subscribe(settings.daemon.lcm.command_channel, 100, [&](const ReceivedMessage& packet) {
+  sender->subscribe(transport.lcm.command_channel, 100, [&](const ReceivedMessage& packet) {
     if (decode(packet.bytes, heard)) ++count;
   });
   TickOutput output;
   output.pressure_bar = PressureVector::Constant(12, 0.5);
   std::int64_t now_ns = monotonic_now_ns();
-  const auto validity_ns = std::llround(1e9 * settings.daemon.lcm.command_validity_s);
+  const auto validity_ns = to_ns(settings.safety.command_validity_s);
   const auto arrives = [&](int wanted) {
     for (int k = 0; count < wanted && k < 100; ++k)
       sender->wait_until(monotonic_now_ns() + 10'000'000);
@@ -162,8 +166,7 @@ TEST_F(DaemonLinkOverUdp, WhatWasDecidedBeforeTheValvesVentedIsNotSentAfterIt) {
 }
 
 TEST_F(DaemonLinkOverUdp, AFloodIsBoundedWork) {
-  for (int k = 0; k < 2000; ++k)
-    sender->publish(settings.daemon.lcm.mocap_channel, straight_frame(k));
+  for (int k = 0; k < 2000; ++k) sender->publish(transport.lcm.mocap_channel, straight_frame(k));
   std::this_thread::sleep_for(std::chrono::milliseconds(50));
   EXPECT_LE(link->collect(monotonic_now_ns()).frames.size(), 64u);
 }
@@ -172,7 +175,7 @@ TEST_F(DaemonLinkOverUdp, CapturesLieBetweenTheLastCollectionAndNow) {
   link->collect(monotonic_now_ns());
   std::int64_t number = 0;
   ASSERT_TRUE(collect_until([&](const TickInput& input) {
-    sender->publish(settings.daemon.lcm.mocap_channel, straight_frame(++number));
+    sender->publish(transport.lcm.mocap_channel, straight_frame(++number));
     for (const MocapFrame& frame : input.frames) {
       EXPECT_LE(frame.capture_ns, input.now_ns);
       EXPECT_GT(frame.capture_ns, input.now_ns - 1'000'000'000);
@@ -183,7 +186,7 @@ TEST_F(DaemonLinkOverUdp, CapturesLieBetweenTheLastCollectionAndNow) {
 
 TEST_F(DaemonLinkOverUdp, ADisarmIsObeyedWhateverItsNumber) {
   const auto request = [this](std::int64_t sequence, std::int8_t what) {
-    sender->publish(settings.daemon.lcm.operator_channel,
+    sender->publish(transport.lcm.operator_channel,
                     operator_command_t{.sequence = sequence, .request = what});
   };
   request(1000, operator_command_t::ARM);
@@ -203,7 +206,7 @@ TEST_F(DaemonLinkOverUdp, ADisarmIsObeyedWhateverItsNumber) {
 
 TEST_F(DaemonLinkOverUdp, AnEmergencyStopIsObeyedWhateverItsNumberAndIsNoDisarm) {
   const auto request = [this](std::int64_t sequence, std::int8_t what) {
-    sender->publish(settings.daemon.lcm.operator_channel,
+    sender->publish(transport.lcm.operator_channel,
                     operator_command_t{.sequence = sequence, .request = what});
   };
   request(1000, operator_command_t::ARM);
@@ -219,12 +222,10 @@ TEST_F(DaemonLinkOverUdp, AnEmergencyStopIsObeyedWhateverItsNumberAndIsNoDisarm)
 
 TEST_F(DaemonLinkOverUdp, AGoIsHeardOnceANumberAndTakenBackAtOnce) {
   const auto say = [this](std::int64_t sequence, bool go) {
-    sender->publish(settings.daemon.lcm.deadman_channel,
+    sender->publish(transport.lcm.deadman_channel,
                     deadman_t{.sequence = sequence, .go = static_cast<std::int8_t>(go)});
   };
-  const auto heard = [](const TickInput& input) {
-    return input.newest_go_ns != SafetyInput::kNever;
-  };
+  const auto heard = [](const TickInput& input) { return input.newest_go_ns != kNever; };
   say(1, true);
   ASSERT_TRUE(collect_until(heard));
   const std::int64_t first_ns = link->collect(monotonic_now_ns()).newest_go_ns;
@@ -241,7 +242,7 @@ TEST_F(DaemonLinkOverUdp, MeasuredPressuresArriveOnceAndOnlyIfTheyMakeSense) {
   const auto send = [this](int chambers, float first) {
     pressure_measurement_t message = test::example<pressure_measurement_t>(chambers / 4, 4);
     message.pressure_bar[0] = first;
-    sender->publish(settings.daemon.lcm.measurement_channel, message);
+    sender->publish(transport.lcm.measurement_channel, message);
   };
   send(12, 1.5F);
   ASSERT_TRUE(collect_until([](const TickInput& input) {
@@ -265,7 +266,7 @@ TEST_F(DaemonLinkOverUdp, AReferenceThatBeginsAnewIsHeardAfterASilence) {
   curvature_reference_t reference = test::example<curvature_reference_t>(3, 4);
   const auto send = [&](std::int64_t sequence) {
     reference.sequence = sequence;
-    sender->publish(settings.daemon.lcm.reference_channel, reference);
+    sender->publish(transport.lcm.reference_channel, reference);
   };
   const auto came = [](const TickInput& input) { return input.reference != nullptr; };
   send(5000);
@@ -280,8 +281,7 @@ TEST_F(DaemonLinkOverUdp, AReferenceThatBeginsAnewIsHeardAfterASilence) {
 }
 
 TEST_F(DaemonLinkOverUdp, AReferenceOfAnotherSizeIsMalformed) {
-  sender->publish(settings.daemon.lcm.reference_channel,
-                  test::example<curvature_reference_t>(2, 4));
+  sender->publish(transport.lcm.reference_channel, test::example<curvature_reference_t>(2, 4));
   EXPECT_TRUE(collect_until([this](const TickInput& input) {
     EXPECT_EQ(input.reference, nullptr);
     return link->malformed() == 1;

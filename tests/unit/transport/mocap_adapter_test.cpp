@@ -8,6 +8,7 @@
 #include <random>
 
 #include "softarm/transport/message_decoding.hpp"
+#include "softarm/transport/settings.hpp"
 #include "unit/transport/messages.hpp"
 
 namespace softarm {

@@ -7,6 +7,7 @@
 #include <random>
 
 #include "counted_malloc.hpp"
+#include "softarm/transport/settings.hpp"
 #include "unit/transport/messages.hpp"
 
 namespace softarm {
@@ -27,15 +28,15 @@ Eigen::Isometry3d random_pose(std::mt19937& random) {
 }
 
 /// Y up, millimetres, x y z w, and a plate on every body.
-DaemonSettings foreign(MocapSourceKind kind, std::mt19937& random) {
-  DaemonSettings daemon;
-  daemon.mocap = {.source = kind,
-                  .unit = LengthUnit::millimetre,
-                  .quaternion = QuaternionOrder::xyzw,
-                  .axes = Eigen::Matrix3d::Identity()};
-  daemon.mocap.axes << 1, 0, 0, 0, 0, -1, 0, 1, 0;
-  daemon.lcm.mocap_channel = "ROOM";
-  daemon.bodies = {.base_id = 10, .segment_ids = {30, 20}};
+TransportSettings foreign(MocapSourceKind kind, std::mt19937& random) {
+  TransportSettings transport;
+  transport.mocap = {.source = kind,
+                     .unit = LengthUnit::millimetre,
+                     .quaternion = QuaternionOrder::xyzw,
+                     .axes = Eigen::Matrix3d::Identity()};
+  transport.mocap.axes << 1, 0, 0, 0, 0, -1, 0, 1, 0;
+  transport.lcm.mocap_channel = "ROOM";
+  transport.bodies = {.base_id = 10, .segment_ids = {30, 20}};
   const auto plate = [&](const std::string& name) {
     PlateSettings out;
     out.name = name;
@@ -44,9 +45,9 @@ DaemonSettings foreign(MocapSourceKind kind, std::mt19937& random) {
     out.position_m = random_pose(random).translation();
     return out;
   };
-  daemon.bodies.base_plate = plate("base");
-  daemon.bodies.segment_plates = {plate("middle"), plate("tip")};
-  return daemon;
+  transport.bodies.base_plate = plate("base");
+  transport.bodies.segment_plates = {plate("middle"), plate("tip")};
+  return transport;
 }
 
 ArmParameters two_segments() {
@@ -83,14 +84,14 @@ void expect_pose(const BodyPose& pose, const Eigen::Isometry3d& truth, double to
 
 TEST(MocapSource, OptitrackFramesBecomePosesOfTheSegmentsEnds) {
   std::mt19937 random(2);
-  const DaemonSettings daemon = foreign(MocapSourceKind::optitrack, random);
-  MocapSource source(daemon, two_segments());
+  const TransportSettings transport = foreign(MocapSourceKind::optitrack, random);
+  MocapSource source(transport, {}, two_segments());
   ASSERT_EQ(source.channels(), std::vector<std::string>{"ROOM"});
   for (int trial = 0; trial < 20; ++trial) {
     const Eigen::Isometry3d truth[] = {random_pose(random), random_pose(random),
                                        random_pose(random)};
-    const PlateSettings plates[] = {daemon.bodies.base_plate, daemon.bodies.segment_plates[0],
-                                    daemon.bodies.segment_plates[1]};
+    const PlateSettings plates[] = {transport.bodies.base_plate, transport.bodies.segment_plates[0],
+                                    transport.bodies.segment_plates[1]};
     const int ids[] = {10, 30, 20};
     optitrack_frame_t message{};
     message.utime = 5;
@@ -102,7 +103,7 @@ TEST(MocapSource, OptitrackFramesBecomePosesOfTheSegmentsEnds) {
       auto& body = message.rigid_bodies[(i + 1) % 3];
       body.id = ids[i];
       body.params = trial == 3 && i == 1 ? 2 : 3;
-      write(sent(truth[i], plates[i], daemon.mocap.axes), body.xyz, body.quat);
+      write(sent(truth[i], plates[i], transport.mocap.axes), body.xyz, body.quat);
     }
     MocapFrame frame;
     ASSERT_EQ(source.take(0, encoded(message), 1'000'000'000 + 5'000'000 * trial, frame),
@@ -124,13 +125,13 @@ TEST(MocapSource, OptitrackFramesBecomePosesOfTheSegmentsEnds) {
 
 TEST(MocapSource, BodiesOnChannelsOfTheirOwnBecomeOneFrame) {
   std::mt19937 random(3);
-  const DaemonSettings daemon = foreign(MocapSourceKind::rigid_transform, random);
-  MocapSource source(daemon, two_segments());
+  const TransportSettings transport = foreign(MocapSourceKind::rigid_transform, random);
+  MocapSource source(transport, {}, two_segments());
   ASSERT_EQ(source.channels(), (std::vector<std::string>{"ROOM_base", "ROOM_middle", "ROOM_tip"}));
   EXPECT_EQ(source.find("ROOM_tip"), 2U);
   EXPECT_EQ(source.find("ROOM"), std::nullopt);
-  const PlateSettings plates[] = {daemon.bodies.base_plate, daemon.bodies.segment_plates[0],
-                                  daemon.bodies.segment_plates[1]};
+  const PlateSettings plates[] = {transport.bodies.base_plate, transport.bodies.segment_plates[0],
+                                  transport.bodies.segment_plates[1]};
   MocapFrame frame;
   for (int trial = 0; trial < 20; ++trial) {
     const std::int64_t arrival_ns = 1'000'000'000 + 5'000'000 * trial;
@@ -139,7 +140,7 @@ TEST(MocapSource, BodiesOnChannelsOfTheirOwnBecomeOneFrame) {
       truth[i] = random_pose(random);
       rigid_transform_t message{};
       message.utime = 5000 * trial;
-      write(sent(truth[i], plates[i], daemon.mocap.axes), message.trans, message.quat);
+      write(sent(truth[i], plates[i], transport.mocap.axes), message.trans, message.quat);
       if (trial == 7 && i == 1) continue;
       const MocapReceipt receipt = source.take(i, encoded(message), arrival_ns, frame);
       ASSERT_EQ(receipt, i == 2 && trial != 7 ? MocapReceipt::frame : MocapReceipt::nothing);
@@ -162,9 +163,9 @@ TEST(MocapSource, BodiesOnChannelsOfTheirOwnBecomeOneFrame) {
 
 TEST(MocapSource, AFixedBaseNeedsNoChannel) {
   std::mt19937 random(4);
-  DaemonSettings daemon = foreign(MocapSourceKind::rigid_transform, random);
-  daemon.bodies.base_id = -1;
-  MocapSource source(daemon, two_segments());
+  TransportSettings transport = foreign(MocapSourceKind::rigid_transform, random);
+  transport.bodies.base_id = -1;
+  MocapSource source(transport, {}, two_segments());
   ASSERT_EQ(source.channels(), (std::vector<std::string>{"ROOM_middle", "ROOM_tip"}));
   rigid_transform_t message{};
   message.quat[3] = 1.0;
@@ -177,9 +178,9 @@ TEST(MocapSource, AFixedBaseNeedsNoChannel) {
 
 TEST(MocapSource, WhatTheAdapterSendsItReadsBack) {
   std::mt19937 random(5);
-  const DaemonSettings daemon = foreign(MocapSourceKind::optitrack, random);
-  const MocapAdapter adapter(daemon.bodies, two_segments(), daemon.mocap);
-  MocapSource source(daemon, two_segments());
+  const TransportSettings transport = foreign(MocapSourceKind::optitrack, random);
+  const MocapAdapter adapter(transport.bodies, two_segments(), transport.mocap);
+  MocapSource source(transport, {}, two_segments());
   MocapFrame frame, again;
   Eigen::Isometry3d truth[3];
   for (std::size_t i = 0; i < 3; ++i) {
@@ -201,8 +202,8 @@ TEST(MocapSource, WhatTheAdapterSendsItReadsBack) {
 
 TEST(MocapSource, HostileNumbersStayWithinBounds) {
   std::mt19937 random(6);
-  MocapSource optitrack(foreign(MocapSourceKind::optitrack, random), two_segments());
-  MocapSource vicon(foreign(MocapSourceKind::rigid_transform, random), two_segments());
+  MocapSource optitrack(foreign(MocapSourceKind::optitrack, random), {}, two_segments());
+  MocapSource vicon(foreign(MocapSourceKind::rigid_transform, random), {}, two_segments());
   MocapFrame frame;
   const double kNan = std::nan("");
   for (const double time_s : {1e300, -1e300, HUGE_VAL, -HUGE_VAL, kNan, 0.0}) {
@@ -233,8 +234,8 @@ TEST(MocapSource, HostileNumbersStayWithinBounds) {
 
 TEST(MocapSource, TakingPacketsAllocatesNothing) {
   std::mt19937 random(7);
-  MocapSource optitrack(foreign(MocapSourceKind::optitrack, random), two_segments());
-  MocapSource vicon(foreign(MocapSourceKind::rigid_transform, random), two_segments());
+  MocapSource optitrack(foreign(MocapSourceKind::optitrack, random), {}, two_segments());
+  MocapSource vicon(foreign(MocapSourceKind::rigid_transform, random), {}, two_segments());
   optitrack_frame_t message{};
   message.num_rigid_bodies = 5;
   message.rigid_bodies.resize(5, optitrack_rigid_body_t{});

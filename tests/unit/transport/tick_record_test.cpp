@@ -9,6 +9,7 @@
 #include <random>
 
 #include "counted_malloc.hpp"
+#include "softarm/runtime/settings.hpp"
 #include "softarm/transport/message_decoding.hpp"
 #include "unit/transport/messages.hpp"
 

@@ -1,0 +1,54 @@
+// The machine's clocks, and deadlines on the monotonic one.
+#pragma once
+
+#include <time.h>
+
+#include <cstdint>
+
+namespace softarm {
+
+/// CLOCK_MONOTONIC in ns.
+std::int64_t monotonic_now_ns() noexcept;
+/// CLOCK_REALTIME (the date) in ns: comparable with other machines' clocks, but it may jump.
+std::int64_t wall_now_ns() noexcept;
+/// Processor time of this thread in ns.
+std::int64_t thread_cpu_ns() noexcept;
+
+/// The monotonic and the wall clock (CLOCK_REALTIME) at one instant, in ns.
+struct ClockPair {
+  std::int64_t monotonic_ns, wall_ns;
+};
+
+/// Reads both together: of a few attempts the one that was held up least between the readings.
+ClockPair read_clocks() noexcept;
+
+/// Sleeps until an absolute time of CLOCK_MONOTONIC; returns early when a signal arrives.
+void sleep_until_ns(std::int64_t deadline_ns) noexcept;
+
+/// What is left until a time of CLOCK_MONOTONIC, not below zero: for ppoll.
+timespec time_left(std::int64_t deadline_ns) noexcept;
+
+/// Absolute deadlines at a fixed period. Missed ones are skipped, never caught up with.
+class PeriodicDeadline {
+ public:
+  /// @param period_ns > 0  @param first_ns time of the first deadline
+  PeriodicDeadline(std::int64_t period_ns, std::int64_t first_ns) noexcept
+      : period_ns_(period_ns), next_ns_(first_ns) {}
+
+  std::int64_t next_ns() const noexcept { return next_ns_; }
+
+  /// To be called after the work of a deadline; returns how many deadlines were missed and skipped.
+  std::int64_t advance(std::int64_t now_ns) noexcept {
+    next_ns_ += period_ns_;
+    if (now_ns <= next_ns_) return 0;
+    const std::int64_t missed = (now_ns - next_ns_) / period_ns_ + 1;
+    next_ns_ += missed * period_ns_;
+    return missed;
+  }
+
+ private:
+  std::int64_t period_ns_;
+  std::int64_t next_ns_;
+};
+
+}  // namespace softarm

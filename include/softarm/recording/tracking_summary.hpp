@@ -1,0 +1,97 @@
+// How well an experiment went, in the few numbers of summary.json.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "softarm/estimation/frame_validator.hpp"
+#include "softarm/runtime/log_row.hpp"
+
+namespace softarm {
+
+class JsonWriter;
+
+/// How well a reference was tracked, accumulated tick by tick: reference minus the plant's true u,
+/// from `tracking_from_s` after each ACTIVE on. Where the reference is a path of the tip, also when
+/// the tip came near it.
+class TrackingSummary {
+ public:
+  TrackingSummary(int segments, double tracking_from_s);
+
+  /// Commands are moments (N m), not pressures (bar).
+  void commands_are_torques() { torques_ = true; }
+
+  void add(const LogRow& row, double period_s);
+
+  /// Tells what became of the frames; without it the summary does not speak of them.
+  void set_frames(const FrameCounters& frames, std::int64_t late) {
+    frames_ = frames;
+    late_frames_ = late;
+  }
+
+  /// Nearer than this to its path, the tip has arrived.
+  static constexpr double kTipNear_m = 0.01;
+
+  double duration_s() const { return ticks_ > 0 ? last_t_s_ - first_t_s_ : 0.0; }
+
+  /// As JSON; byte-identical for identical rows.
+  std::string json() const;
+
+  /// Every change of mode, in order; at most kMaxTransitions of them.
+  struct Transition {
+    double t_s;
+    Mode mode;
+    Reason reason;
+  };
+  static constexpr std::size_t kMaxTransitions = 10'000;
+  const std::vector<Transition>& transitions() const { return transitions_; }
+
+  /// A table for people.
+  std::string table() const;
+
+ private:
+  struct MeanSquare {
+    double sum = 0.0;
+    std::int64_t count = 0;
+    void add(double error) {
+      sum += error * error;
+      ++count;
+    }
+    double rms() const;  ///< NaN when empty
+  };
+  void add_tracking(const LogRow& row);
+  void add_tip(const LogRow& row);
+  std::string tip_line() const;
+  void write_tracking(JsonWriter& json) const;
+  void write_frames(JsonWriter& json) const;
+
+  int segments_;
+  double tracking_from_s_;
+  double active_since_s_ = std::numeric_limits<double>::quiet_NaN();
+  double first_t_s_ = std::numeric_limits<double>::quiet_NaN();
+  double last_t_s_ = 0.0;
+  std::int64_t ticks_ = 0;
+  std::int64_t active_ticks_ = 0;
+  std::int64_t saturated_ticks_ = 0;
+  MeanSquare u_;
+  double u_max_rad_ = std::numeric_limits<double>::quiet_NaN();
+  std::vector<MeanSquare> u_of_segment_, theta_, phi_;
+  std::vector<std::pair<double, double>> tip_squared_;  ///< time and squared error, for the halves
+  double tip_max_m_ = std::numeric_limits<double>::quiet_NaN();
+  bool tip_is_asked_ = false;    ///< the reference was a path of the tip
+  double tip_last_far_s_ = 0.0;  ///< after the latest ACTIVE: when the tip was last kTipNear_m off
+  double tip_last_s_ = 0.0;
+  double command_max_ = 0.0;  ///< bar, or N m
+  bool torques_ = false;
+  std::array<double, 6> mode_s_{};
+  std::vector<Transition> transitions_;
+  std::optional<FrameCounters> frames_;
+  std::int64_t late_frames_ = 0;
+};
+
+}  // namespace softarm

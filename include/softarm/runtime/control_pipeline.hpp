@@ -1,0 +1,133 @@
+// From motion-capture frames to valve pressures: the tick.
+//
+//   ControlPipeline pipeline(settings);
+//   const TickOutput& output = pipeline.tick({.now_ns = now, .frames = frames});   // every period
+//   send(output.pressure_bar);
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <limits>
+#include <span>
+
+#include "softarm/actuation/pressure_allocator.hpp"
+#include "softarm/actuation/pressure_ramps.hpp"
+#include "softarm/base/time.hpp"
+#include "softarm/control/curvature_controller.hpp"
+#include "softarm/control/reference.hpp"
+#include "softarm/estimation/curvature_filter.hpp"
+#include "softarm/estimation/frame_validator.hpp"
+#include "softarm/runtime/following.hpp"
+#include "softarm/runtime/safety_monitor.hpp"
+#include "softarm/runtime/settings.hpp"
+
+namespace softarm {
+
+/// A live reference as it came over the wire: 2n numbers each; rad, rad/s, rad/s^2.
+struct LiveReferenceInput {
+  SegmentVector u, velocity, acceleration;
+};
+
+/// What has happened since the last tick. Times are of one monotonic clock, in ns.
+struct TickInput {
+  std::int64_t now_ns = 0;
+  std::span<const MocapFrame> frames;  ///< in order of arrival, capture times on our clock
+  const LiveReferenceInput* reference = nullptr;  ///< the newest, if one came
+  bool arm = false;
+  bool disarm = false;
+  bool emergency_stop = false;
+  bool shutdown = false;         ///< from now on: vent, and nothing else
+  bool command_expired = false;  ///< so long ago was one sent that the valves have vented meanwhile
+  int consecutive_overruns = 0;  ///< ticks missed in a row; zero where they are not to be judged
+  /// Arrival of the newest pressure measurement, where the valves publish them.
+  std::int64_t newest_measurement_ns = kNever;
+  /// The measured pressures (bar, one a chamber), if some came since the last tick.
+  const PressureVector* measured_bar = nullptr;
+  /// Arrival of the newest "go", where there is a dead-man input.
+  std::int64_t newest_go_ns = kNever;
+};
+
+/// What the tick saw, decided and commands.
+struct TickOutput {
+  Mode mode = Mode::init;
+  Reason reason = Reason::starting;
+  bool armed = false;
+  bool saturated = false;     ///< a torque was out of the chambers' reach and was scaled down
+  bool slew_limited = false;  ///< a pressure could not move as fast as asked
+  bool reference_limited =
+      false;                ///< the reference was bent, or a live one refused, by a soft limit
+  bool soft_limit = false;  ///< the arm is beyond max_theta_rad or max_speed_radps
+  bool bounded = false;     ///< the controller bounded something near a singularity
+  std::int64_t frame_number = -1;                                 ///< newest accepted frame
+  double frame_age_s = std::numeric_limits<double>::quiet_NaN();  ///< now minus its capture
+  FilteredMotion motion;      ///< u and u' predicted to the middle of the period that begins now
+  ReferenceSample reference;  ///< at the same instant; empty unless ACTIVE
+  SegmentVector tau_actuation_nm;  ///< (17); empty unless ACTIVE
+  PressureVector pressure_bar;     ///< to be sent
+};
+
+/// The same object runs in the daemon, in lock-step simulation and in replay. Reads no clock,
+/// allocates nothing and throws nothing after construction.
+class ControlPipeline {
+ public:
+  /// @throws std::invalid_argument as the rooms it is made of, for settings that do not fit
+  /// together
+  explicit ControlPipeline(const PipelineSettings& settings);
+
+  const TickOutput& tick(const TickInput& input) noexcept;
+
+  const TickOutput& output() const noexcept { return output_; }
+  const FrameCounters& counters() const noexcept { return validator_.counters(); }
+  /// Dropped for their age: captured more than max_latency_s ago, or not yet.
+  std::int64_t late_frames() const noexcept { return late_frames_; }
+  /// u and residuals of the newest accepted frame.
+  const CurvatureEstimate& estimate() const noexcept { return validator_.estimate(); }
+  /// Every commanded pressure is zero.
+  bool fully_vented() const noexcept { return output_.pressure_bar.isZero(0.0); }
+  std::int64_t period_ns() const noexcept { return period_ns_; }
+
+ private:
+  void forget_command() noexcept;
+  void validate_and_estimate(const TickInput& input, SafetyInput& safety) noexcept;
+  void watch(const TickInput& input, SafetyInput& safety) noexcept;
+  void use_frame(const MocapFrame& frame) noexcept;
+  void predict(std::int64_t at_ns) noexcept;
+  void expect(std::int64_t at_ns) noexcept;
+  void take_reference(const TickInput& input) noexcept;
+  void control() noexcept;
+  void limit(Mode mode) noexcept;
+  bool poses_frozen() const noexcept;
+  bool beyond_soft_limit(bool speed_too) const noexcept;
+  double seconds(std::int64_t time_ns) const noexcept { return to_seconds(time_ns - epoch_ns_); }
+
+  PipelineSettings settings_;
+  std::int64_t period_ns_;
+  double period_s_;
+  FrameValidator validator_;
+  CurvatureFilter filter_;
+  SafetyMonitor safety_;
+  Reference reference_;
+  CurvatureController controller_;
+  PressureAllocator allocator_;
+  PressureRamps ramps_;
+  PressureWatch pressure_watch_;
+  CurvatureWatch curvature_watch_;
+
+  TickOutput output_;
+  ReferenceWindow window_;
+  KnownMotion known_;
+  ControlOutput control_;
+  Allocation allocation_;
+  PressureVector previous_bar_;
+  SegmentVector previous_tau_nm_;               ///< that these give
+  PressureVector pressure_at_last_motion_bar_;  ///< commanded when the poses last changed
+  std::array<std::int64_t, kMaxSegments> seen_ns_{};
+  std::int64_t epoch_ns_ = 0;
+  std::int64_t previous_ns_ = 0;
+  std::int64_t newest_capture_ns_ = kNever;
+  std::int64_t late_frames_ = 0;
+  std::uint32_t activations_ = 0;
+  bool ticked_ = false;
+};
+
+}  // namespace softarm

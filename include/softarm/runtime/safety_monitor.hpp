@@ -1,0 +1,143 @@
+// The safety monitor: a pure state machine that decides, tick by tick, whether the arm may be
+// moved.
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <span>
+
+#include "softarm/base/time.hpp"
+#include "softarm/runtime/settings.hpp"
+
+namespace softarm {
+
+/// What the daemon does with the valves. The order is the order of severity from `active` on.
+enum class Mode : std::int8_t {
+  init,         ///< before the first tick
+  wait_frames,  ///< vented, until good frames come and the arm is armed
+  active,       ///< under control
+  hold,         ///< pressures frozen
+  vent,         ///< pressures ramp to zero and stay there
+  fault         ///< like `vent`, and latched until an operator disarms
+};
+
+/// Why the mode is what it is; `cause_table` says what each demands and what clears it. The numbers
+/// go over the wire: new ones are added at the end.
+enum class Reason : std::int8_t {
+  none,
+  starting,
+  waiting_for_frames,
+  waiting_for_arm,
+  frames_late,
+  poses_frozen,
+  overruns,
+  frames_stale,
+  sender_restarted,
+  soft_limit,
+  time_gap,
+  many_overruns,
+  disarmed,
+  shutdown,
+  valves_silent,
+  emergency_stop,
+  deadman_released,
+  pressure_mismatch,
+  curvature_mismatch,
+  command_expired
+};
+inline constexpr int kReasons = static_cast<int>(Reason::command_expired) + 1;
+
+/// As above, in static storage; "unknown" for a value outside the enumeration.
+const char* name(Mode mode) noexcept;
+const char* name(Reason reason) noexcept;
+
+/// What it takes, once a cause is gone, until the arm may be active again. Always `good_frames`
+/// good frames in a row, after VENT and FAULT counted from when the arm is fully vented.
+enum class Clearance : std::int8_t {
+  good_frames,      ///< no more than that; after VENT an `arm` too, with explicit arming
+  arm,              ///< an operator's `arm`, with automatic arming too
+  disarm_then_arm,  ///< an operator's `disarm`, which leaves FAULT, and then an `arm`
+  never             ///< the daemon ends
+};
+
+/// One row of the table of causes.
+struct CauseRule {
+  Reason reason;
+  Mode demands;
+  Clearance clearance;
+};
+/// Every cause; of those present the first one counts.
+std::span<const CauseRule> cause_table() noexcept;
+
+/// Times after which silence has consequences, resolved from settings and control period.
+struct SafetyThresholds {
+  std::int64_t hold_after_ns;  ///< frame age that freezes the pressures
+  std::int64_t vent_after_ns;  ///< frame age, or gap between ticks, that vents
+  std::int64_t valve_silence_ns;
+  std::int64_t deadman_timeout_ns;
+};
+SafetyThresholds resolve_thresholds(const SafetySettings& settings,
+                                    double control_period_s) noexcept;
+
+/// What the monitor is told in one tick. Times are of one monotonic clock, in ns.
+struct SafetyInput {
+  std::int64_t now_ns = 0;
+  std::int64_t newest_capture_ns = kNever;  ///< of the segment seen longest ago
+  bool motion_unknown = false;              ///< u of some segment is not known at this tick
+  int good_frames = 0;  ///< accepted since the last tick with every segment seen
+  int bad_frames = 0;   ///< the others
+  bool sender_restarted = false;
+  bool poses_frozen = false;  ///< poses repeat bit for bit although the command has moved
+  bool soft_limit_exceeded = false;
+  bool fully_vented = false;                    ///< every commanded pressure is zero
+  int consecutive_overruns = 0;                 ///< ticks missed in a row, up to this one
+  std::int64_t newest_measurement_ns = kNever;  ///< of the valves' read-back
+  bool pressure_mismatch = false;               ///< measured pressures do not follow the commands
+  bool curvature_mismatch = false;              ///< the arm is not where its pressures would put it
+  bool command_expired = false;                 ///< the valves have vented for want of a command
+  bool deadman_used = false;                    ///< there is a dead-man input
+  std::int64_t newest_go_ns = kNever;           ///< of that
+  bool arm = false;
+  bool disarm = false;
+  bool emergency_stop = false;
+  bool shutdown = false;
+};
+
+/// Reads no clock, allocates nothing, throws nothing. Transitions follow the severity of the causes
+/// present: the most severe wins. Valves count as silent for as long as the monitor was stepped and
+/// did not hear them: what arrived while the daemon was stopped may have been dropped. After such a
+/// stop, or where commands did not reach the valves in time, no frame is good before they have been
+/// heard again, and for half a second neither frames nor an `arm` count: they may be older than
+/// they look.
+/// While nothing is pressurised (WAIT_FRAMES) a cause that demands HOLD or VENT only keeps the arm
+/// from becoming active; with explicit arming one that demands VENT takes the arming back.
+class SafetyMonitor {
+ public:
+  SafetyMonitor(const SafetySettings& settings, double control_period_s) noexcept;
+
+  Mode step(const SafetyInput& input) noexcept;
+
+  Mode mode() const noexcept { return mode_; }
+  Reason reason() const noexcept { return reason_; }
+  bool armed() const noexcept { return armed_; }
+  const SafetyThresholds& thresholds() const noexcept { return thresholds_; }
+
+ private:
+  void note_stop(const SafetyInput& input) noexcept;
+  CauseRule worst_cause(const SafetyInput& input) const noexcept;
+  void take_operator_requests(const SafetyInput& input, Mode demanded) noexcept;
+  void enter(const CauseRule& cause) noexcept;
+  void try_to_activate(const SafetyInput& input, Reason otherwise) noexcept;
+
+  SafetySettings settings_;
+  SafetyThresholds thresholds_;
+  Mode mode_ = Mode::init;
+  Reason reason_ = Reason::starting;
+  bool armed_;
+  int good_in_a_row_ = 0;
+  std::int64_t previous_tick_ns_ = 0;
+  std::int64_t listening_since_ns_ = kNever;  ///< end of the last stop, for the valves
+  std::int64_t deaf_until_ns_ = kNever;       ///< to `arm` and frames, after a stop
+};
+
+}  // namespace softarm

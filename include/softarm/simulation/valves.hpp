@@ -1,0 +1,67 @@
+// The valves of the simulated arm: how pressures follow what is commanded.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <span>
+
+#include "softarm/simulation/settings.hpp"
+
+namespace softarm {
+
+/// Proportional valves with a first-order lag between commanded and real pressure and a finite
+/// supply.
+///
+/// While a command is held the pressure is known in closed form, p(t) = c + (p(0) - c) exp(-t /
+/// lag): stepping is exact for any step, and an integrator may ask for the pressure at any time
+/// ahead. Lag 0 is the ideal valve. A slew limit, if any, first lets the pressure rise (or fall) on
+/// a straight line until the lag alone is slower; a resolution rounds what is commanded. Dead time
+/// is not theirs: see ArmPlant.
+class Valves {
+ public:
+  /// @param chambers number of valves, >= 0. All start at 0 bar with 0 bar commanded.
+  /// @param both_signs for actuation by torque: commands are bounded to [-supply, supply].
+  /// @throw std::invalid_argument for a negative count, a lag that is negative or not finite, a
+  /// supply below 0.
+  Valves(const ValveSettings& settings, int chambers, bool both_signs = false);
+
+  int size() const noexcept { return static_cast<int>(pressure_bar_.size()); }
+
+  /// Sets what is commanded from now on, bounded to [0, supply]; a value that is not a number
+  /// counts as 0 bar. With lag 0 the pressures follow at once. @param command_bar `size()`
+  /// pressures above ambient.
+  void command(std::span<const double> command_bar) noexcept;
+
+  /// Lets `step_s` >= 0 pass with the command held (exact).
+  void advance(double step_s) noexcept;
+
+  /// Puts the real pressures where they are said to be (bar, bounded to [0, supply]), the command
+  /// too.
+  void reset(std::span<const double> pressure_bar) noexcept;
+
+  /// What the pressures will be `ahead_s` >= 0 from now if the command is held; `out` has `size()`.
+  void after(double ahead_s, Eigen::Ref<Eigen::VectorXd> out) const noexcept;
+
+  /// Whether a slew limit is in force: then pressures are not exponentials of time.
+  bool slewed() const noexcept { return slew_bar_per_s_ > 0.0; }
+
+  /// exp(-ahead / lag): what is left after `ahead_s` of the difference between pressure and command
+  /// (0 with lag 0).
+  double remaining(double ahead_s) const noexcept;
+
+  const Eigen::VectorXd& pressures_bar() const noexcept { return pressure_bar_; }  ///< real, now
+  const Eigen::VectorXd& commanded_bar() const noexcept {
+    return command_bar_;
+  }  ///< within the supply
+
+ private:
+  double lag_s_;
+  double supply_bar_;
+  double lowest_bar_;
+  double slew_bar_per_s_;
+  double resolution_bar_;
+  Eigen::VectorXd pressure_bar_;
+  Eigen::VectorXd command_bar_;
+};
+
+}  // namespace softarm

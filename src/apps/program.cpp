@@ -1,0 +1,95 @@
+#include "apps/program.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <cstdio>
+#include <exception>
+#include <filesystem>
+#include <iostream>
+
+#include "softarm/base/instance_lock.hpp"
+#include "softarm/base/version.hpp"
+#include "softarm/config/config_error.hpp"
+
+namespace softarm {
+namespace {
+
+int parse_and_run(int argc, char** argv, CLI::App& app, const std::function<int()>& body) {
+  try {
+    app.parse(argc, argv);
+    return body();
+  } catch (const CLI::RuntimeError& error) {  // a sub-command's own exit code
+    return error.get_exit_code();
+  } catch (const CLI::RequiredError& error) {
+    // An unknown option is the likelier reason why something is missing.
+    const std::vector<std::string> unknown = app.remaining(true);
+    if (!unknown.empty())
+      app.exit(CLI::ExtrasError(app.get_name(), unknown));
+    else
+      app.exit(error);
+    return kExitUsage;
+  } catch (const CLI::ParseError& error) {  // --help and --version come this way too
+    return app.exit(error) == 0 ? kExitOk : kExitUsage;
+  } catch (const ConfigError& error) {
+    print_error(app.get_name(), error.what());
+    return kExitConfiguration;
+  } catch (const OtherInstance& error) {
+    print_error(app.get_name(), error.what());
+    return kExitOtherInstance;
+  } catch (const std::exception& error) {
+    print_error(app.get_name(), error.what());
+    return kExitFailure;
+  }
+}
+
+}  // namespace
+
+std::string shared_file(const std::string& name, const std::string& source) {
+  std::error_code error;
+  const auto program = std::filesystem::read_symlink("/proc/self/exe", error);
+  const auto installed = program.parent_path().parent_path() / "share" / "softarm" / name;
+  return std::filesystem::exists(installed, error) ? installed.string() : source;
+}
+
+void say(const std::string& text) noexcept { std::fputs(text.c_str(), stderr); }
+
+CLI::Validator number_between(double low, double high) {
+  const auto check = [low, high](std::string& text) -> std::string {
+    double number = 0.0;
+    return CLI::detail::lexical_cast(text, number) && number >= low && number <= high
+               ? std::string()
+               : fmt::format("expected {:g} to {:g}, got {}", low, high, text);
+  };
+  return {check, fmt::format("{:g} to {:g}", low, high)};
+}
+
+CLI::Validator positive_seconds() {
+  static constexpr double kLongest_s = 1e8;  // three years; their nanoseconds fit an int64
+  const auto check = [](std::string& text) -> std::string {
+    double seconds = 0.0;
+    const bool number = CLI::detail::lexical_cast(text, seconds);
+    return number && seconds > 0.0 && seconds <= kLongest_s
+               ? std::string()
+               : fmt::format("expected seconds above 0 and up to {:g}, got {}", kLongest_s, text);
+  };
+  return {check, "SECONDS"};
+}
+
+void print_error(const std::string& program, const std::string& message) {
+  say(fmt::format("{}: error: {}\n", program, message));
+}
+
+int run_program(int argc, char** argv, CLI::App& app, const std::function<int()>& body) {
+  app.set_version_flag(
+      "--version", fmt::format("{} {} (commit {})", app.get_name(), version_text(), commit_text()));
+  const int code = parse_and_run(argc, argv, app, body);
+  std::cout.flush();
+  if ((std::fflush(stdout) != 0 || !std::cout) && code == kExitOk) {
+    print_error(app.get_name(), "standard output could not be written");
+    return kExitFailure;
+  }
+  return code;
+}
+
+}  // namespace softarm

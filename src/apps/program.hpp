@@ -1,0 +1,44 @@
+// What all executables share: exit codes, --help and --version, how an error is told.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <functional>
+#include <string>
+
+namespace softarm {
+
+/// Exit codes, after sysexits.h.
+enum ExitCode : int {
+  kExitOk = 0,
+  kExitFailure = 1,         ///< anything not listed here
+  kExitDifferent = 2,       ///< softarm replay: a command or status is not what was recorded
+  kExitUsage = 64,          ///< the command line is wrong
+  kExitData = 65,           ///< a log is damaged, or lacks what it was read for
+  kExitOtherInstance = 75,  ///< another instance holds the command channel
+  kExitConfiguration = 78,  ///< the configuration is wrong (ConfigError)
+};
+
+/// A file that comes with the programs: `name` in PREFIX/share/softarm of the installed program
+/// that runs, else `source`, where it is in the tree this was built from.
+std::string shared_file(const std::string& name, const std::string& source);
+
+/// Prints on stderr. What cannot be written (a full disk, a closed pipe) is lost: no program that
+/// moves an arm may end for that.
+void say(const std::string& text) noexcept;
+
+/// Accepts a finite time above zero, in s.
+CLI::Validator positive_seconds();
+
+/// Accepts a number from `low` to `high`; "nan" is none.
+CLI::Validator number_between(double low, double high);
+
+/// Prints "NAME: error: MESSAGE" on stderr.
+void print_error(const std::string& program, const std::string& message);
+
+/// Adds --version, parses, then runs `body` and returns its exit code; errors become a message and
+/// the code above. The callback of a sub-command runs while parsing, before `body`; it may throw
+/// CLI::RuntimeError(code) to end the program with that code. Returns kExitFailure where standard
+/// output could not be written. Throws nothing.
+int run_program(int argc, char** argv, CLI::App& app, const std::function<int()>& body);
+
+}  // namespace softarm

@@ -1,0 +1,87 @@
+// softarm check: is this configuration right, and what does it say in full? With --live: does the
+// arm that is running fit it?
+#include <fmt/format.h>
+
+#include <memory>
+#include <string>
+
+#include "apps/program.hpp"
+#include "apps/softarm/commands.hpp"
+#include "apps/softarm/live_check.hpp"
+#include "softarm/config/load.hpp"
+
+namespace softarm {
+namespace {
+
+struct CheckOptions {
+  std::string file;
+  bool print_template = false;
+  bool print_schema = false;
+  bool live = false;
+  LiveCheckOptions live_check;
+};
+
+int check(const CheckOptions& options) {
+  if (options.print_template || options.print_schema) {
+    fmt::print("{}", options.print_template ? template_text() : schema_text());
+    return kExitOk;
+  }
+  const Experiment experiment = load_experiment(options.file);
+  for (const std::string& warning : experiment_warnings(experiment)) {
+    fmt::print(stderr, "{}: warning: {}\n", options.file, warning);
+  }
+  if (options.live) return check_live(experiment, options.live_check);
+  fmt::print("# {}, configuration {}\n{}", options.file, hash_text(experiment.hash),
+             resolved_text(experiment));
+  return kExitOk;
+}
+
+void add_live_options(CLI::App& command, CheckOptions& options) {
+  CLI::Option* live =
+      command.add_flag("--live", options.live,
+                       "look at the running arm instead: one line a check, exit code 1 where one "
+                       "fails");
+  LiveCheckOptions& more = options.live_check;
+  command.add_option("--seconds", more.listen_s, "how long to listen, in s")
+      ->check(positive_seconds())
+      ->capture_default_str()
+      ->needs(live);
+  command.add_flag("--json", more.json, "the findings as JSON")->needs(live);
+  CLI::Option* pulse =
+      command
+          .add_flag("--pulse", more.pulse,
+                    "MOVES THE ARM: fill every chamber softly, one after the other, within the "
+                    "limits of the section identification; softarmd must not run, Ctrl-C vents")
+          ->needs(live);
+  command
+      .add_option("--pressure", more.plan.pressure_bar,
+                  "of a pulse, in bar (default: what bends a segment alone by 0.15 rad)")
+      ->check(number_between(0.001, 100.0))
+      ->needs(pulse);
+  command
+      .add_option("--hold", more.plan.hold_s, "of a pulse, in s: two thirds settle, one measures")
+      ->check(number_between(0.05, 100.0))
+      ->capture_default_str()
+      ->needs(pulse);
+}
+
+}  // namespace
+
+void add_check_command(CLI::App& app) {
+  auto options = std::make_shared<CheckOptions>();
+  CLI::App* command = app.add_subcommand(
+      "check",
+      "Check a configuration and print it in full, every default written out; or a running arm");
+  auto* group = command->add_option_group("what to print")->require_option(1);
+  group->add_option("CONFIG", options->file, "experiment in YAML");
+  group->add_flag("--template", options->print_template,
+                  "print a configuration that documents every key instead");
+  group->add_flag("--schema", options->print_schema,
+                  "print a JSON Schema instead, by which editors complete and check an experiment");
+  add_live_options(*command, *options);
+  command->callback([options] {
+    if (const int code = check(*options); code != kExitOk) throw CLI::RuntimeError(code);
+  });
+}
+
+}  // namespace softarm

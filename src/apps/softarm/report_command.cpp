@@ -1,0 +1,87 @@
+// softarm report: what a recorded LCM log (lcm-logger) tells of a run, in the same files and plots
+// as `softarm run`.
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <stdexcept>
+
+#include "apps/program.hpp"
+#include "apps/progress.hpp"
+#include "apps/softarm/commands.hpp"
+#include "apps/softarm/plots.hpp"
+#include "softarm/config/load.hpp"
+#include "softarm/recording/status_record.hpp"
+#include "softarm/transport/event_log.hpp"
+
+namespace softarm {
+namespace {
+
+struct ReportOptions {
+  std::string log;
+  std::string config;
+  std::string out = "out";
+  bool plots = true;
+};
+
+int report(const ReportOptions& options) {
+  const Experiment experiment = load_experiment(options.config);
+  std::ifstream file(options.log, std::ios::binary);
+  if (!file) {
+    throw std::runtime_error(
+        fmt::format("cannot read {}: is it an LCM log (lcm-logger)?", options.log));
+  }
+  const auto size = static_cast<double>(std::filesystem::file_size(options.log));
+  EventLogReader log(file);
+  StatusRecord record(experiment, options.out);
+  Progress progress;
+  for (LogEvent event; log.next(event);) {
+    if (record.take(event.channel, event.data)) record.write_rows(false);
+    if (progress.due()) {
+      progress.update(fmt::format("{:3.0f} % of {}, {:.0f} s",
+                                  100.0 * static_cast<double>(log.position()) / size, options.log,
+                                  record.time_s()));
+    }
+  }
+  record.close();
+  if (record.rows() == 0) {
+    print_error("softarm", fmt::format("{} holds no status of an arm of {} segments on channel {}; "
+                                       "daemon.lcm.status_channel says which to look for",
+                                       options.log, experiment.arm.size(),
+                                       experiment.transport.lcm.status_channel));
+    return kExitData;
+  }
+  if (static_cast<std::uint64_t>(record.status().configuration_hash) != experiment.hash) {
+    say(fmt::format(
+        "softarm: warning: the log was made with configuration {:016x}, {} is {:016x}: what the "
+        "report takes from the configuration may not be what was in force\n",
+        static_cast<std::uint64_t>(record.status().configuration_hash), options.config,
+        experiment.hash));
+  }
+  fmt::print("{}log, summary and timing are in {}\n", record.table(), options.out);
+  if (options.plots) draw_plots(options.out);
+  if (log.damage_count() > 0) {
+    print_error("softarm", options.log + ": " + log.damage_text());
+    return kExitData;
+  }
+  return kExitOk;
+}
+
+}  // namespace
+
+void add_report_command(CLI::App& app) {
+  auto options = std::make_shared<ReportOptions>();
+  CLI::App* command = app.add_subcommand("report", "Tables and plots of a recorded LCM log");
+  command->add_option("LOG", options->log, "log of lcm-logger")->required();
+  command->add_option("CONFIG", options->config, "the experiment it was recorded of")->required();
+  command
+      ->add_option("--out", options->out, "folder for log.csv, summary.json, timing.json and plots")
+      ->capture_default_str();
+  command->add_flag("!--no-plots", options->plots, "do not draw the plots");
+  command->callback([options] {
+    if (const int code = report(*options); code != kExitOk) throw CLI::RuntimeError(code);
+  });
+}
+
+}  // namespace softarm

@@ -1,0 +1,151 @@
+// softarm run: the daemon's pipeline and the simulated arm in one process, in lock step, as fast as
+// the machine allows.
+#include <fmt/format.h>
+
+#include <cmath>
+#include <filesystem>
+#include <memory>
+
+#include "apps/program.hpp"
+#include "apps/progress.hpp"
+#include "apps/softarm/commands.hpp"
+#include "apps/softarm/plots.hpp"
+#include "softarm/base/clock.hpp"
+#include "softarm/base/time.hpp"
+#include "softarm/config/load.hpp"
+#include "softarm/recording/experiment_log.hpp"
+#include "softarm/recording/logged_run.hpp"
+#include "softarm/recording/shape_log.hpp"
+#include "softarm/recording/tracking_summary.hpp"
+#include "softarm/simulation/lock_step.hpp"
+
+namespace softarm {
+namespace {
+
+struct RunOptions {
+  std::string config;
+  std::string out = "out";
+  std::string mocap_log;
+  bool plots = true;
+  double duration_s = 0.0;
+  std::uint64_t seed = 0;
+  bool has_seed = false;
+};
+
+struct Recorded {
+  std::int64_t took_ns = 0;  ///< wall time, log and all
+  bool was_active = false;
+};
+
+/// Steps whatever makes the rows to its end, or to `duration_s`; every tick, or every
+/// `ticks_a_row` of them, is a row.
+template <class Stepper>
+Recorded record(Stepper& stepper, double duration_s, double period_s, std::int64_t ticks_a_row,
+                ExperimentLog& log, ShapeLog& shapes, TrackingSummary& summary) {
+  Progress progress;
+  Recorded recorded;
+  LogRow row;
+  const std::int64_t before_ns = monotonic_now_ns();
+  const auto ticks = static_cast<std::int64_t>(std::llround(duration_s / period_s));
+  for (std::int64_t k = 0; k < ticks; ++k) {
+    const bool logged = k % ticks_a_row == 0;
+    if (!stepper.step(row, logged)) break;
+    recorded.was_active |= stepper.pipeline().output().mode == Mode::active;
+    if (!logged) continue;
+    log.add(row);
+    shapes.add(row);
+    summary.add(row, static_cast<double>(ticks_a_row) * period_s);
+    if (progress.due())
+      progress.update(fmt::format("{:.1f} of {:.1f} s, {}", row.t_s, duration_s, name(row.mode)));
+  }
+  const ControlPipeline& pipeline = stepper.pipeline();
+  summary.set_frames(pipeline.counters(), pipeline.late_frames());
+  recorded.took_ns = monotonic_now_ns() - before_ns;
+  return recorded;
+}
+
+/// Why an arm was never ACTIVE, from where it stood at the end.
+std::string never_active(const TickOutput& end, const Experiment& experiment, double duration_s) {
+  std::string text = fmt::format("the arm was never ACTIVE in {:.3g} s: {} ({})", duration_s,
+                                 name(end.mode), name(end.reason));
+  if (end.reason == Reason::waiting_for_frames)
+    text += fmt::format("; it takes {} good frames in a row (safety.good_frames)",
+                        experiment.safety.good_frames);
+  return text;
+}
+
+int run(const RunOptions& options) {
+  Experiment experiment = load_experiment(options.config);
+  if (options.has_seed) experiment.seed = experiment.plant.seed = options.seed;
+  const double duration_s =
+      options.duration_s > 0.0 ? options.duration_s : experiment.run.duration_s;
+  const double period_s = 1.0 / experiment.rate_hz;
+
+  TrackingSummary summary(experiment.arm.size(), experiment.run.tracking_from_s);
+  if (experiment.actuation.kind == ActuationKind::torque) summary.commands_are_torques();
+  TimingReport timing;
+  std::string failure;
+  const auto record_and_report = [&](auto& stepper) {
+    ExperimentLog log(options.out, experiment);
+    ShapeLog shapes(options.out, experiment);
+    const double log_rate_hz = experiment.run.log_rate_hz;
+    const std::int64_t ticks_a_row =
+        log_rate_hz > 0.0 ? std::max(1LL, std::llround(experiment.rate_hz / log_rate_hz)) : 1;
+    const Recorded recorded =
+        record(stepper, duration_s, period_s, ticks_a_row, log, shapes, summary);
+    log.close();
+    timing.real_time_factor =
+        summary.duration_s() / to_seconds(std::max<std::int64_t>(1, recorded.took_ns));
+    if (!recorded.was_active)
+      failure = never_active(stepper.pipeline().output(), experiment, summary.duration_s());
+    timing.histograms = {{"tick_us", stepper.tick_times().counts(), stepper.tick_times().max_us()}};
+  };
+  std::unique_ptr<LoggedRun> logged;
+  if (options.mocap_log.empty()) {
+    record_and_report(*std::make_unique<LockStep>(experiment, experiment.plant));
+  } else {
+    logged = std::make_unique<LoggedRun>(experiment, options.mocap_log);
+    record_and_report(*logged);
+  }
+  const std::filesystem::path out(options.out);
+  write_text(out / "summary.json", summary.json());
+  write_text(out / "timing.json", timing_json(timing));
+  fmt::print("{}{:.0f} times faster than real time; log, summary and timing are in {}\n",
+             summary.table(), timing.real_time_factor, options.out);
+  if (options.plots) draw_plots(options.out);
+  if (!failure.empty()) print_error("softarm", failure);
+  if (logged && logged->log().damage_count() > 0) {
+    print_error("softarm", options.mocap_log + ": " + logged->log().damage_text());
+    return kExitData;
+  }
+  return failure.empty() ? kExitOk : kExitFailure;
+}
+
+}  // namespace
+
+void add_run_command(CLI::App& app) {
+  auto options = std::make_shared<RunOptions>();
+  CLI::App* command =
+      app.add_subcommand("run", "Run an experiment on the simulated arm, faster than real time");
+  command->add_option("CONFIG", options->config, "experiment in YAML")->required();
+  command
+      ->add_option("--out", options->out, "folder for log.csv, summary.json, timing.json and plots")
+      ->capture_default_str();
+  command
+      ->add_option("--duration", options->duration_s,
+                   "simulated time in s (default: run.duration_s)")
+      ->check(positive_seconds());
+  command->add_option("--mocap", options->mocap_log,
+                      "take the frames from this LCM log instead of the simulated arm");
+  command->add_flag("!--no-plots", options->plots, "do not draw the plots");
+  auto* seed = command
+                   ->add_option("--seed", options->seed,
+                                "seed of noise and dropouts (default: the configuration's)")
+                   ->check(CLI::NonNegativeNumber);
+  command->callback([options, seed] {
+    options->has_seed = seed->count() > 0;
+    if (const int code = run(*options); code != kExitOk) throw CLI::RuntimeError(code);
+  });
+}
+
+}  // namespace softarm

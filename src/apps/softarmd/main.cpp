@@ -1,0 +1,125 @@
+// softarmd: the control daemon. Motion-capture frames in, valve pressures out, at a fixed rate.
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "apps/program.hpp"
+#include "apps/signals.hpp"
+#include "softarm/base/instance_lock.hpp"
+#include "softarm/base/line_log.hpp"
+#include "softarm/base/realtime.hpp"
+#include "softarm/base/service_notifier.hpp"
+#include "softarm/base/time.hpp"
+#include "softarm/base/version.hpp"
+#include "softarm/config/load.hpp"
+#include "softarm/transport/daemon_loop.hpp"
+#include "softarm/transport/lcm_node.hpp"
+#include "softarm/transport/settings.hpp"
+
+namespace softarm {
+namespace {
+
+void print_summary(const DaemonLoop& loop) {
+  const LoopTiming& timing = loop.timing();
+  const auto line = [](const char* what, const DurationHistogram& histogram) {
+    say(fmt::format("softarmd: {:<10} p50 {:>8.1f} us   p99 {:>8.1f} us   max {:>8.1f} us\n", what,
+                    quantile_us(histogram.counts(), 0.5), quantile_us(histogram.counts(), 0.99),
+                    histogram.max_us()));
+  };
+  line("lateness", timing.lateness);
+  line("frame age", timing.frame_age);
+  line("tick", timing.tick);
+  line("publish", timing.publish);
+  const FrameCounters& frames = loop.pipeline().counters();
+  say(fmt::format(
+      "softarmd: {} ticks, {} missed; frames: {} accepted, {} rejected, {} repeated, {} missing; "
+      "{} malformed messages, {} not sent\n",
+      timing.ticks, timing.overruns, frames.accepted,
+      frames.rejected() + loop.pipeline().late_frames(), frames.repeated, frames.missing,
+      loop.link().malformed(), loop.link().unsent()));
+}
+
+/// Prints every change of mode or reason, and what was refused; reports to the service manager.
+void run(DaemonLoop& loop, LineLog& log, ServiceNotifier& service) {
+  constexpr std::int64_t kRefused_ns = 1'000'000'000;  // malformed messages come at any rate
+  Mode mode = Mode::init;
+  Reason reason = Reason::none;
+  std::int64_t refused = 0, refused_reported_ns = kNever;
+  const auto report_refused = [&](std::int64_t now_ns) {
+    const std::int64_t total = loop.link().malformed();
+    if (total == refused || now_ns < refused_reported_ns + kRefused_ns) return;
+    log.add("{} malformed messages refused, {} in all", total - refused, total);
+    refused = total;
+    refused_reported_ns = now_ns;
+  };
+  loop.run([] { return stop_requested != 0; },
+           [&](const DaemonLoop::Report& report) {
+             const TickOutput& output = loop.pipeline().output();
+             if (output.mode != mode || output.reason != reason) {
+               mode = output.mode;
+               reason = output.reason;
+               log.add("{:.3f} s: {} ({})", to_seconds(report.since_start_ns), name(mode),
+                       name(reason));
+             }
+             report_refused(report.woken_ns);
+             service.report(report.woken_ns, {.state = name(mode),
+                                              .reason = name(reason),
+                                              .on_time = report.on_time,
+                                              .stopping = report.stopping});
+           });
+  report_refused(kForever);
+}
+
+int serve(const std::string& path, bool shadow) {
+  const Experiment experiment = load_experiment(path);
+  const LcmSettings& lcm = experiment.transport.lcm;
+  const std::string channel = lcm.command_channel + (shadow ? " (shadow)" : "");
+  const InstanceLock lock(lock_name(channel, lcm.url));
+  catch_stop_signals();
+  ignore_broken_pipes();
+
+  say(fmt::format("softarmd {} commit {} configuration {:016x} seed {}: {} at {} Hz{}\n",
+                  version_text(), commit_text(), experiment.hash, experiment.seed, experiment.name,
+                  experiment.rate_hz,
+                  shadow ? ", shadow: commands are marked as not for the valves" : ""));
+  for (const std::string& warning : experiment_warnings(experiment))
+    say(fmt::format("softarmd: warning: {}\n", warning));
+  ServiceNotifier service;
+  if (!service.problem().empty()) say(fmt::format("softarmd: warning: {}\n", service.problem()));
+  // A thread inherits the scheduling in force when it starts. The one that prints gets none of it;
+  // LCM's receive thread stays one below the tick, which a flood of messages would else starve.
+  LineLog log("softarmd", say);
+  // The tick's own priority is asked for first, and its refusal told: whatever is refused later is
+  // the same, or less was asked for.
+  const RealtimeSettings& realtime = experiment.realtime;
+  for (const std::string& refused : apply_realtime_settings(realtime))
+    say(fmt::format("softarmd: warning: {}\n", refused));
+  RealtimeSettings below_tick = realtime;
+  below_tick.priority = std::max(1, below_tick.priority - 1);
+  apply_realtime_settings(below_tick);
+  DaemonLoop loop(experiment, experiment.transport,
+                  {.version = fmt::format("{} {}", version_text(), commit_text()),
+                   .configuration_hash = experiment.hash,
+                   .seed = experiment.seed,
+                   .build = build_text()},
+                  shadow);
+  apply_realtime_settings(realtime);
+  run(loop, log, service);
+  log.finish();
+  print_summary(loop);
+  return kExitOk;
+}
+
+}  // namespace
+}  // namespace softarm
+
+int main(int argc, char** argv) {
+  CLI::App app(
+      "Control daemon for soft continuum arms: motion-capture frames in, valve pressures out",
+      "softarmd");
+  std::string config;
+  bool shadow = false;
+  app.add_option("CONFIG", config, "experiment in YAML")->required();
+  app.add_flag("--shadow", shadow, "run everything, but mark commands as not for the valves");
+  return softarm::run_program(argc, argv, app, [&] { return softarm::serve(config, shadow); });
+}

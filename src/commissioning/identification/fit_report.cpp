@@ -1,0 +1,170 @@
+#include "softarm/commissioning/identification/fit_report.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace softarm {
+namespace {
+
+/// The largest parts of a combination of parameters, e.g. "+0.71 stiffness k -0.70 lag".
+std::string combination_text(const ParameterSet& set, const Eigen::VectorXd& weights) {
+  std::vector<Eigen::Index> order;
+  for (Eigen::Index i = 0; i < set.size(); ++i) order.push_back(i);
+  std::sort(order.begin(), order.end(), [&](Eigen::Index a, Eigen::Index b) {
+    return std::abs(weights[a]) > std::abs(weights[b]);
+  });
+  const double sign = weights[order.front()] < 0.0 ? -1.0 : 1.0;
+  std::string text;
+  for (const Eigen::Index i : order) {
+    if (std::abs(weights[i]) < 0.2) break;
+    text += fmt::format("{}{:+.2f} ({} / {:.3g} {})", text.empty() ? "" : " ", sign * weights[i],
+                        set[i].name, set[i].scale, set[i].unit);
+  }
+  return text;
+}
+
+template <class Value>
+std::string list(int count, const Value& value) {
+  std::string text = "[";
+  for (int i = 0; i < count; ++i) text += fmt::format("{}{:.7g}", i > 0 ? ", " : "", value(i));
+  return text + "]";
+}
+
+/// Chambers as they push.
+std::string chambers_yaml(const ArmHypothesis& arm, const char* indent) {
+  std::string text;
+  for (int i = 0; i < arm.arm.size(); ++i) {
+    std::vector<double> angles, gains;
+    for (std::size_t j = 0; j < arm.segment_of.size(); ++j) {
+      if (arm.segment_of[j] != i) continue;
+      const Eigen::Vector2d push = -arm.push.col(static_cast<Eigen::Index>(j));
+      gains.push_back(std::max(1e-9, push.norm()));
+      double angle = std::atan2(push.y(), push.x());
+      if (angle < -1e-12) angle += 2.0 * std::numbers::pi;
+      angles.push_back(angle + 0.0);
+    }
+    const int count = static_cast<int>(gains.size());
+    const auto of = [](const std::vector<double>& values) {
+      return [&values](int j) { return values[static_cast<std::size_t>(j)]; };
+    };
+    text += fmt::format("{}  - {{angle_rad: {}, gain_nm_per_bar: {}}}\n", indent,
+                        list(count, of(angles)), list(count, of(gains)));
+  }
+  return text;
+}
+
+std::string segments_yaml(const ArmParameters& arm, const char* indent) {
+  const auto of = [&](double SegmentParameters::*member) {
+    return list(arm.size(),
+                [&](int i) { return arm.segments[static_cast<std::size_t>(i)].*member; });
+  };
+  return fmt::format("{0}stiffness_nm_per_rad: {1}\n{0}damping_nms_per_rad: {2}\n", indent,
+                     of(&SegmentParameters::stiffness_nm_per_rad),
+                     of(&SegmentParameters::damping_nms_per_rad));
+}
+
+}  // namespace
+
+std::string fit_table(const ParameterSet& set, const Refinement& fit) {
+  std::string text = fmt::format("{:<32}{:>12}{:>12}  (95 % interval)\n", "", "value", "+-");
+  for (Eigen::Index i = 0; i < set.size(); ++i)
+    text += fmt::format("{:<32}{:>12.6g}{:>12.2g}  {}\n", set[i].name, fit.x[i] * set[i].scale,
+                        fit.half_width(i) * set[i].scale, set[i].unit);
+  text += fmt::format(
+      "residual {:.3g} mrad rms a component, of a motion of {:.3g} mrad rms about its mean; {} "
+      "frames, of which {:.3g} count as one\n",
+      1e3 * fit.rms_rad, 1e3 * fit.motion_rms_rad, fit.time_s.size(), fit.inflation);
+  if (!fit.converged)
+    text += "THE SEARCH HAS NOT CONVERGED: seek fewer parameters, or give a longer record\n";
+  return text;
+}
+
+std::string linear_table(const ParameterSet& set, const LinearFit& fit) {
+  std::string text =
+      fmt::format("{:<32}{:>12}{:>12}  (standard error)\n", "least squares alone", "value", "+-");
+  for (Eigen::Index i = 0; i < set.size(); ++i)
+    text += fmt::format("{:<32}{:>12.6g}{:>12.2g}  {}\n", set[i].name, fit.x[i] * set[i].scale,
+                        fit.standard_error[i] * set[i].scale, set[i].unit);
+  return text + fmt::format("residual {:.3g} N m rms, of moments of {:.3g} N m rms\n",
+                            fit.residual_rms_nm, fit.moment_rms_nm);
+}
+
+std::string conditioning_text(const ParameterSet& set, const Refinement& fit) {
+  const Eigen::Index kept = set.size() - fit.held;
+  std::string text;
+  if (kept > 0)
+    text += fmt::format(
+        "singular values {:.3g} to {:.3g} (1 over one is the standard error of its combination); "
+        "told least: {}\n",
+        fit.singular_values[0], fit.singular_values[kept - 1],
+        combination_text(set, fit.combinations.col(kept - 1)));
+  for (Eigen::Index i = kept; i < set.size(); ++i)
+    text += fmt::format("not told by this record, left as configured: {}\n",
+                        combination_text(set, fit.combinations.col(i)));
+  return text;
+}
+
+std::string coverage_text(const CoverageTable& table) {
+  std::string text = fmt::format("{:<32}{:>10}{:>10}{:>10}{:>12}{:>10}\n", "", "covered", "bias",
+                                 "scatter", "half width", "worst");
+  for (const CoverageRow& row : table.rows) {
+    const double unit = row.relative ? 100.0 : 1e3;
+    text +=
+        fmt::format("{:<32}{:>6}/{:<3}{:>10.3f}{:>10.3f}{:>12.3f}{:>10.3f}  {}\n", row.name,
+                    row.covered, table.seeds - table.failed, unit * row.bias, unit * row.scatter,
+                    unit * row.half_width, unit * row.worst, row.relative ? "%" : "m" + row.unit);
+  }
+  if (table.failed > 0) text += fmt::format("{} searches did not converge\n", table.failed);
+  return text;
+}
+
+std::string identified_yaml(const Experiment& experiment, const ArmHypothesis& arm,
+                            const FitChoice& choice, const std::string& note,
+                            const std::filesystem::path& config,
+                            const std::filesystem::path& output) {
+  namespace fs = std::filesystem;
+  const fs::path folder = fs::absolute(output).parent_path();
+  const bool chambers = experiment.actuation.kind == ActuationKind::chambers;
+  std::string text = fmt::format("# {}\ninclude: {}\n\narm:\n{}", note,
+                                 fs::proximate(fs::absolute(config), folder).string(),
+                                 segments_yaml(arm.arm, "  "));
+  if (chambers) text += "\nactuation:\n  chambers:\n" + chambers_yaml(arm, "  ");
+  text += fmt::format(
+      "\nidentification:\n  lag_s: {:.6g}\n  delay_s: {:.6g}\n  cubic_nm_per_rad3: {:.6g}\n"
+      "  rest_u_rad: [",
+      arm.lag_s, arm.delay_s, arm.cubic_nm_per_rad3);
+  for (Eigen::Index i = 0; i < arm.arm.size(); ++i)
+    text += fmt::format("{}[{:.6g}, {:.6g}]", i > 0 ? ", " : "", arm.rest_rad[2 * i],
+                        arm.rest_rad[2 * i + 1]);
+  text += "]\n";
+  // The controller inverts the lag on what depends on the reference alone.
+  if (choice.lag && arm.lag_s <= 5.0)
+    text += fmt::format("\ncontrol:\n  valve_lag_s: {:.6g}\n", arm.lag_s);
+  text += "\n# The simulated arm is what it was.\nplant:\n  arm:\n" +
+          segments_yaml(experiment.plant.arm, "    ");
+  if (chambers)
+    text += "  actuation:\n    chambers:\n" + chambers_yaml(of_plant(experiment), "    ");
+  return text;
+}
+
+std::string residuals_csv(const Refinement& fit) {
+  std::string text = "time_s";
+  const Eigen::Index dof = fit.measured_rad.cols();
+  for (const char* name : {"measured", "simulated"})
+    for (Eigen::Index c = 0; c < dof; ++c)
+      text += fmt::format(",{}_u{}_{}_rad", name, c / 2 + 1, c % 2 == 0 ? "x" : "y");
+  text += "\n";
+  for (Eigen::Index k = 0; k < fit.time_s.size(); ++k) {
+    text += fmt::format("{:.6f}", fit.time_s[k]);
+    for (Eigen::Index c = 0; c < dof; ++c) text += fmt::format(",{:.8g}", fit.measured_rad(k, c));
+    for (Eigen::Index c = 0; c < dof; ++c)
+      text += fmt::format(",{:.8g}", fit.measured_rad(k, c) - fit.residual_rad(k, c));
+    text += "\n";
+  }
+  return text;
+}
+
+}  // namespace softarm

@@ -1,0 +1,39 @@
+#include "softarm/commissioning/identification/identify.hpp"
+
+#include <limits>
+#include <stdexcept>
+
+namespace softarm {
+namespace {
+
+/// RMS of what an arm leaves over, infinite where it has no bounded response.
+double distance_rad(const ParameterSet& set, const MotionRecord& record, const Eigen::VectorXd& x) {
+  try {
+    return predict(set, record, x).rms_rad;
+  } catch (const std::runtime_error&) {
+    return std::numeric_limits<double>::infinity();
+  }
+}
+
+}  // namespace
+
+Refinement identify(const ParameterSet& set, const MotionRecord& record,
+                    const IdentifyOptions& options) {
+  const Eigen::VectorXd believed = set.believed();
+  const LinearFit start =
+      fit_linear_and_lag(set, record, believed, options.window_s, options.longest_lag_s);
+  // Noise and smoothing may make nonsense of a motion that tells little: what comes nearest.
+  Eigen::VectorXd nearest = believed;
+  double least_rad = distance_rad(set, record, believed);
+  const auto consider = [&](const Eigen::VectorXd& x) {
+    const double distance = distance_rad(set, record, x);
+    if (distance >= least_rad) return;
+    nearest = x;
+    least_rad = distance;
+  };
+  consider(start.x.cwiseMax(set.lowest()));
+  for (const ArmHypothesis& arm : options.near) consider(set.of(arm).cwiseMax(set.lowest()));
+  return refine(set, record, nearest, options.refinement);
+}
+
+}  // namespace softarm

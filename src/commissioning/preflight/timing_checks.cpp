@@ -1,0 +1,231 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+
+#include "softarm/base/time.hpp"
+#include "softarm/commissioning/preflight/checks.hpp"
+#include "softarm/runtime/safety_monitor.hpp"
+#include "softarm/runtime/settings.hpp"
+#include "softarm/transport/settings.hpp"
+
+namespace softarm {
+namespace {
+
+constexpr double kSeenEnough = 0.99;        ///< of the frames
+constexpr double kRateTolerance = 0.05;     ///< of the period
+constexpr double kMissingTolerance = 0.01;  ///< of the frames
+constexpr double kLatencyTolerance_s = 0.002;
+constexpr double kLongestLatency_s = 1.0;  ///< more than that is two clocks
+
+std::string body_name(std::size_t index, const TransportSettings& transport) {
+  const BodySettings& bodies = transport.bodies;
+  const std::string what = index == 0 ? "base" : fmt::format("end of segment {}", index);
+  if (transport.mocap.source == MocapSourceKind::rigid_transform)
+    return fmt::format("{} (channel {})", what,
+                       body_channel(transport.lcm, index == 0 ? bodies.base_plate
+                                                              : bodies.segment_plates[index - 1]));
+  return fmt::format("{} (id {})", what,
+                     index == 0 ? bodies.base_id : bodies.segment_ids[index - 1]);
+}
+
+std::string id_list(const std::vector<int>& ids) { return fmt::format("{}", fmt::join(ids, ", ")); }
+
+Finding check_bodies(const Experiment& experiment, const Observation& seen) {
+  Finding out{.check = kBodies};
+  const LcmSettings& lcm = experiment.transport.lcm;
+  const std::string channels = fmt::format("{}", fmt::join(seen.channels, ", "));
+  const double listened_s = to_seconds(seen.rest_end_ns - seen.start_ns);
+  if (seen.frames.empty()) {
+    out.verdict = Verdict::fail;
+    out.text = fmt::format("no frame on {} within {:.1f} s", channels, listened_s);
+    if (seen.not_frames > 0)
+      out.text += fmt::format(", but {} packets that are no frame", seen.not_frames);
+    out.cure = fmt::format(
+        "start the sender of frames, or mend transport.mocap.source; it must publish on {} at {}",
+        channels, lcm.url);
+    return out;
+  }
+  const auto count = static_cast<int>(seen.frames.front().body.size());
+  const MeanPoses mean = mean_poses(seen, seen.start_ns, kForever, count);
+  std::vector<std::string> missing;
+  for (std::size_t i = 0; i < mean.seen.size(); ++i)
+    if (mean.seen[i] < kSeenEnough)
+      missing.push_back(mean.seen[i] == 0.0 ? body_name(i, experiment.transport) + " never seen"
+                                            : fmt::format("{} seen in {:.1f} % of the frames",
+                                                          body_name(i, experiment.transport),
+                                                          100.0 * mean.seen[i]));
+  out.text = fmt::format("{} frames in {:.1f} s on {}", seen.frames.size(),
+                         to_seconds(seen.frames.back().arrival_ns - seen.start_ns), channels);
+  if (missing.empty()) {
+    out.verdict = Verdict::pass;
+    out.text += fmt::format(", all {} bodies seen", count);
+    return out;
+  }
+  out.verdict = Verdict::fail;
+  out.text += fmt::format(": {}", fmt::join(missing, ", "));
+  out.cure = seen.other_ids.empty()
+                 ? "markers hidden, too few or not tracked"
+                 : fmt::format("daemon.bodies does not name ids {}, which are there",
+                               id_list(seen.other_ids));
+  return out;
+}
+
+/// Time stamps that advance: the sender's, else the arrivals.
+struct Times {
+  bool stamped = false;
+  std::vector<double> s;             ///< of every new frame
+  std::vector<std::int64_t> number;  ///< of the same
+  std::vector<double> arrival_s;
+};
+
+Times times_of(const Observation& seen) {
+  Times out;
+  int advancing = 0;
+  for (std::size_t k = 1; k < seen.frames.size(); ++k)
+    advancing += seen.frames[k].sender_us > seen.frames[k - 1].sender_us ? 1 : 0;
+  out.stamped = 2 * advancing > static_cast<int>(seen.frames.size());
+  const SeenFrame* last = nullptr;
+  for (const SeenFrame& frame : seen.frames) {
+    if (last != nullptr && frame.number <= last->number) continue;  // repeated or overtaken
+    last = &frame;
+    out.number.push_back(frame.number);
+    out.arrival_s.push_back(to_seconds(frame.arrival_ns - seen.start_ns));
+    out.s.push_back(
+        out.stamped ? 1e-6 * static_cast<double>(frame.sender_us - seen.frames.front().sender_us)
+                    : out.arrival_s.back());
+  }
+  return out;
+}
+
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+Finding check_rate(const Experiment& experiment, const Times& times) {
+  Finding out{.check = "rate"};
+  std::vector<double> periods_s;
+  for (std::size_t k = 1; k < times.s.size(); ++k)
+    periods_s.push_back((times.s[k] - times.s[k - 1]) /
+                        static_cast<double>(times.number[k] - times.number[k - 1]));
+  const double period_s = median(periods_s);
+  const double configured_s = experiment.safety.frame_period_s;
+  const auto sent = static_cast<double>(times.number.back() - times.number.front() + 1);
+  const double missing = 1.0 - static_cast<double>(times.number.size()) / sent;
+  out.text = fmt::format("{:.1f} Hz{}, {:.1f} Hz configured; {:.1f} % of the frames missing",
+                         1.0 / period_s, times.stamped ? "" : " by arrival", 1.0 / configured_s,
+                         100.0 * missing);
+  if (std::abs(period_s / configured_s - 1.0) > kRateTolerance) {
+    out.verdict = Verdict::fail;
+    out.cure = fmt::format("daemon.safety.frame_period_s: {:.4g}, or the camera's rate", period_s);
+  } else if (missing > kMissingTolerance) {
+    out.verdict = Verdict::fail;
+    out.cure =
+        "a wired network of its own between camera host and this machine; a receive buffer "
+        "that holds the frames";
+  } else {
+    out.verdict = Verdict::pass;
+  }
+  return out;
+}
+
+Finding check_jitter(const Experiment& experiment, const Times& times) {
+  Finding out{.check = "jitter"};
+  const SafetySettings& safety = experiment.safety;
+  const double hold_s =
+      to_seconds(resolve_thresholds(safety, 1.0 / experiment.rate_hz).hold_after_ns);
+  double longest_s = 0.0, least_s = 1e300, most_s = -1e300;
+  int late = 0;
+  for (std::size_t k = 0; k < times.s.size(); ++k) {
+    const double way_s = times.arrival_s[k] - times.s[k];
+    least_s = std::min(least_s, way_s);
+    most_s = std::max(most_s, way_s);
+    if (k == 0) continue;
+    const double gap_s = times.arrival_s[k] - times.arrival_s[k - 1];
+    longest_s = std::max(longest_s, gap_s);
+    late += gap_s + safety.frame_latency_s > hold_s ? 1 : 0;
+  }
+  out.text = fmt::format("frames arrive at most {:.1f} ms after one another", 1e3 * longest_s);
+  if (times.stamped)
+    out.text += fmt::format(", their way varies by {:.1f} ms", 1e3 * (most_s - least_s));
+  out.text += fmt::format("; HOLD after {:.1f} ms", 1e3 * hold_s);
+  out.verdict = late > 0 ? Verdict::fail : Verdict::pass;
+  if (late > 0) {
+    out.text += fmt::format(", which would have come {} times", late);
+    out.cure = "quieten the network and this machine, or raise safety.hold_after_s";
+  }
+  return out;
+}
+
+/// Least time from stamp to arrival, if the stamps are of one of our clocks.
+std::optional<double> least_latency_s(const Observation& seen, std::string& clock) {
+  std::int64_t least_ns = kForever;
+  for (const SeenFrame& frame : seen.frames)
+    least_ns = std::min(least_ns, frame.arrival_ns - 1000 * frame.sender_us);
+  for (const auto& [name, offset_ns] : {std::pair<const char*, std::int64_t>{"monotonic clock", 0},
+                                        {"wall clock", seen.wall_minus_ns}}) {
+    const double latency_s = to_seconds(least_ns + offset_ns);
+    if (latency_s < -1e-3 || latency_s > kLongestLatency_s) continue;
+    clock = name;
+    return latency_s;
+  }
+  return std::nullopt;
+}
+
+Finding check_latency(const Experiment& experiment, const Observation& seen, const Times& times) {
+  Finding out{.check = "latency"};
+  const double declared_s = experiment.safety.frame_latency_s;
+  if (!times.stamped) {
+    if (experiment.transport.capture_time == ClockMode::latency) {
+      out.text =
+          fmt::format("frames carry no advancing time; {:.1f} ms declared", 1e3 * declared_s);
+      return out;
+    }
+    out.verdict = Verdict::fail;
+    out.text = "the sender's time stamps do not advance";
+    out.cure = "stamp every frame at exposure, or transport.capture_time: latency";
+    return out;
+  }
+  std::string clock;
+  const std::optional<double> least_s = least_latency_s(seen, clock);
+  if (!least_s) {
+    out.text = fmt::format(
+        "the sender's clock is none of ours, so only changes of latency show (see jitter); {:.1f} "
+        "ms declared",
+        1e3 * declared_s);
+    return out;
+  }
+  out.text = fmt::format("at least {:.1f} ms by our {}, {:.1f} ms declared", 1e3 * *least_s, clock,
+                         1e3 * declared_s);
+  out.verdict = Verdict::pass;
+  if (std::abs(*least_s - declared_s) > std::max(kLatencyTolerance_s, 0.25 * declared_s)) {
+    out.verdict = Verdict::fail;
+    out.cure = fmt::format(
+        "daemon.safety.frame_latency_s: {:.4f}, unless stamps are not taken at "
+        "exposure",
+        std::max(0.0, *least_s));
+  }
+  return out;
+}
+
+}  // namespace
+
+std::vector<Finding> check_timing(const Experiment& experiment, const Observation& seen) {
+  std::vector<Finding> out{check_bodies(experiment, seen)};
+  const Times times = times_of(seen);
+  if (times.s.size() < 10) {
+    for (const char* check : {"rate", "jitter", "latency"})
+      out.push_back({check, Verdict::not_checked, "fewer than 10 frames", ""});
+    return out;
+  }
+  out.push_back(check_rate(experiment, times));
+  out.push_back(check_jitter(experiment, times));
+  out.push_back(check_latency(experiment, seen, times));
+  return out;
+}
+
+}  // namespace softarm

@@ -1,0 +1,31 @@
+// Which chamber bends which segment where.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "softarm/commissioning/preflight/checks.hpp"
+
+namespace softarm {
+
+/// What one pulse did, as the moment that the model needs for it.
+struct PulseResponse {
+  Pulse pulse;
+  double configured_rad = 0.0;  ///< the chamber's angle chi
+  double configured_nm = 0.0;   ///< gain times pressure
+  int segment = 0;              ///< that the largest moment acts on
+  double measured_rad = 0.0;    ///< angle of a chamber that would act so
+  double measured_nm = 0.0;
+  bool silent() const { return measured_nm < 0.2 * configured_nm; }
+  bool astray() const { return segment != pulse.segment; }
+  /// measured minus configured, in [-pi, pi]
+  double turned_rad() const;
+};
+
+/// Nothing where the arm was not seen whole before or during the pulse.
+std::optional<PulseResponse> response_to(const Experiment& experiment, const Observation& seen,
+                                         const Pulse& pulse);
+
+Finding check_valve_map(const Experiment& experiment, const Observation& seen);
+
+}  // namespace softarm

@@ -1,0 +1,127 @@
+#include "softarm/recording/experiment_log.hpp"
+
+#include <fmt/format.h>
+
+#include <fstream>
+#include <iterator>
+#include <stdexcept>
+
+#include "softarm/base/json_writer.hpp"
+#include "softarm/base/version.hpp"
+
+namespace softarm {
+
+std::string provenance_line(const Experiment& experiment) {
+  return fmt::format("# softarm {} commit {} configuration {:016x} seed {} name {}", version_text(),
+                     commit_text(), experiment.hash, experiment.seed, experiment.name);
+}
+
+ExperimentLog::ExperimentLog(const std::filesystem::path& folder, const Experiment& experiment)
+    : path_(folder / "log.csv"), segments_(experiment.arm.size()) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  file_.reset(std::fopen(path_.c_str(), "w"));
+  if (!file_)
+    throw std::runtime_error(fmt::format("cannot write {}: choose another --out", path_.string()));
+
+  std::string header = provenance_line(experiment) + "\nt_s,mode,reason,saturated,frame_age_s";
+  for (int i = 1; i <= segments_; ++i)
+    header += fmt::format(
+        ",u{0}_x_rad,u{0}_y_rad,v{0}_x_radps,v{0}_y_radps,ref{0}_x_rad,ref{0}_y_rad,true{0}_x_rad,"
+        "true{0}_y_rad,"
+        "tau{0}_x_nm,tau{0}_y_nm,twist{0}_rad,length{0}_m",
+        i);
+  chambers_ = 0;
+  for (std::size_t i = 0; i < experiment.actuation.segments.size(); ++i)
+    for (std::size_t j = 0; j < experiment.actuation.segments[i].size(); ++j, ++chambers_)
+      header += fmt::format(",p{0}_{1}_bar,pm{0}_{1}_bar", i + 1, j + 1);
+  header += ",tip_x_m,tip_y_m,tip_z_m,tipref_x_m,tipref_y_m,tipref_z_m\n";
+  std::fputs(header.c_str(), file_.get());
+}
+
+void ExperimentLog::cell(double value) {
+  line_ += ',';
+  if (std::isfinite(value)) fmt::format_to(std::back_inserter(line_), "{:.9g}", value);
+}
+
+void ExperimentLog::cells(const double* values, int count, int expected) {
+  for (int k = 0; k < expected; ++k)
+    cell(k < count ? values[k] : std::numeric_limits<double>::quiet_NaN());
+}
+
+void ExperimentLog::add(const LogRow& row) {
+  line_.clear();
+  fmt::format_to(std::back_inserter(line_), "{:.9g},{},{},{}", row.t_s, name(row.mode),
+                 name(row.reason), row.saturated ? 1 : 0);
+  cell(row.frame_age_s);
+  const auto pair = [this](const SegmentVector& v, int i) {
+    cells(v.data() + 2 * i, v.size() >= 2 * i + 2 ? 2 : 0, 2);
+  };
+  const auto single = [this](const SegmentVector& v, int i) {
+    cells(v.data() + i, v.size() > i ? 1 : 0, 1);
+  };
+  for (int i = 0; i < segments_; ++i) {
+    for (const SegmentVector* v :
+         {&row.u, &row.velocity, &row.reference, &row.truth, &row.tau_actuation})
+      pair(*v, i);
+    single(row.residual_twist, i);
+    single(row.residual_length, i);
+  }
+  for (int j = 0; j < chambers_; ++j) {
+    cells(row.commanded.data() + j, row.commanded.size() > j ? 1 : 0, 1);
+    cells(row.real.data() + j, row.real.size() > j ? 1 : 0, 1);
+  }
+  cells(row.tip ? row.tip->data() : nullptr, row.tip ? 3 : 0, 3);
+  cells(row.tip_reference ? row.tip_reference->data() : nullptr, row.tip_reference ? 3 : 0, 3);
+  line_ += '\n';
+  std::fputs(line_.c_str(), file_.get());
+}
+
+void ExperimentLog::close() {
+  const bool written = std::fflush(file_.get()) == 0 && std::ferror(file_.get()) == 0;
+  file_.reset();
+  if (!written)
+    throw std::runtime_error(
+        fmt::format("could not write all of {}: is the disk full?", path_.string()));
+}
+
+std::string timing_json(const TimingReport& report) {
+  JsonWriter json;
+  json.open_object();
+  json.member("real_time_factor", report.real_time_factor);
+  for (const auto& each : report.histograms) {
+    json.key(each.name);
+    json.open_object();
+    json.member("p50", quantile_us(each.counts, 0.5));
+    json.member("p99", quantile_us(each.counts, 0.99));
+    json.member("max", each.max_us);
+    json.close_object();
+  }
+  json.key("histograms");
+  json.open_object();
+  for (const auto& each : report.histograms) {
+    json.key(each.name);
+    json.open_object();
+    json.key("edges_us");
+    json.open_array();
+    for (int k = 0; k < kDurationBuckets; ++k) json.value(bucket_edge_us(k));
+    json.close_array();
+    json.key("counts");
+    json.open_array();
+    for (const std::int64_t count : each.counts) json.value(count);
+    json.close_array();
+    json.close_object();
+  }
+  json.close_object();
+  json.close_object();
+  return json.text() + "\n";
+}
+
+void write_text(const std::filesystem::path& path, const std::string& text) {
+  std::ofstream file(path);
+  file << text << std::flush;
+  if (!file)
+    throw std::runtime_error(fmt::format("cannot write {}: is the disk full?", path.string()));
+}
+
+}  // namespace softarm

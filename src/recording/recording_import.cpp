@@ -1,0 +1,268 @@
+#include "softarm/recording/recording_import.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <lcm/lcm-cpp.hpp>
+#include <softarm_messages/mocap_frame_t.hpp>
+#include <softarm_messages/pressure_command_t.hpp>
+#include <softarm_messages/pressure_measurement_t.hpp>
+#include <stdexcept>
+
+#include "softarm/estimation/pose_statistics.hpp"
+#include "softarm/runtime/settings.hpp"
+#include "softarm/transport/pose_convention.hpp"
+
+namespace softarm {
+namespace {
+
+constexpr double kMostRestSpread_m = 2e-3;  ///< an arm that moves more is not at rest
+
+/// The rotation of the recording's axes to ours, z up; right-handed axes stay right-handed.
+Eigen::Matrix3d to_z_up(UpAxis up) {
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
+  if (up == UpAxis::x) rotation << 0, 0, -1, 0, 1, 0, 1, 0, 0;
+  if (up == UpAxis::y) rotation << 1, 0, 0, 0, 0, -1, 0, 1, 0;
+  return rotation;
+}
+
+/// One row's body as it stands in the table; not valid where it was not seen: all zero, or no
+/// number. The norm is kept: whether a quaternion is believed is for the validator to say.
+BodyPose body_in(const CsvTable& table, std::size_t row, const BodyColumns& body) {
+  BodyPose pose;
+  for (std::size_t i = 0; i < 3; ++i)
+    pose.position_m[static_cast<Eigen::Index>(i)] = table.at(row, body.position[i]);
+  for (std::size_t i = 0; i < 4; ++i)
+    pose.orientation.coeffs()[static_cast<Eigen::Index>(i)] = table.at(row, body.orientation[i]);
+  pose.valid = pose.position_m.allFinite() && pose.orientation.coeffs().allFinite() &&
+               !pose.orientation.coeffs().isZero(0.0);
+  return pose;
+}
+
+bool same_poses(const CsvTable& table, const RecordingMap& map, std::size_t a, std::size_t b) {
+  const auto same = [&](std::size_t column) {
+    const double one = table.at(a, column), other = table.at(b, column);
+    return one == other || (std::isnan(one) && std::isnan(other));
+  };
+  return std::all_of(map.bodies.begin(), map.bodies.end(), [&](const BodyColumns& body) {
+    return std::all_of(body.position.begin(), body.position.end(), same) &&
+           std::all_of(body.orientation.begin(), body.orientation.end(), same);
+  });
+}
+
+class Importer {
+ public:
+  explicit Importer(const MappedTable& recording)
+      : map_(recording.map),
+        table_(recording.table),
+        convention_(map_.bodies.size(), convention(Eigen::Isometry3d::Identity())) {
+    check_times();
+    if (map_.rest) learn_rest();
+  }
+
+  ImportSummary write(const std::filesystem::path& out) {
+    lcm::LogFile log(out.string(), "w");
+    if (!log.good()) {
+      throw std::runtime_error(
+          fmt::format("{}: expected a file that can be written", out.string()));
+    }
+    for (std::size_t row = 0; row < table_.rows(); ++row) {
+      if (!map_.measured.empty()) append(log, map_.measurement_channel, row, measurement(row));
+      if (!map_.commanded.empty()) append(log, map_.command_channel, row, command(row));
+      append(log, map_.mocap_channel, row, frame(row));
+    }
+    if (std::fflush(log.getFilePtr()) != 0) {
+      throw std::runtime_error(fmt::format("{}: could not be written", out.string()));
+    }
+    summary_.rows = static_cast<std::int64_t>(table_.rows());
+    summary_.duration_s = time_s(table_.rows() - 1) - time_s(0);
+    return summary_;
+  }
+
+ private:
+  double time_s(std::size_t row) const {
+    return map_.time_unit_s * table_.at(row, map_.time_column);
+  }
+  std::int64_t time_us(std::size_t row) const { return std::llround(1e6 * time_s(row)); }
+
+  void check_times() const {
+    for (std::size_t row = 0; row < table_.rows(); ++row) {
+      const double t = time_s(row);
+      const bool advances = row == 0 || t > time_s(row - 1);
+      // LCM's logs begin at 0 and the daemon's clocks know 64-bit nanoseconds.
+      if (!(t >= 0.0 && t < 4e9) || !advances) {
+        throw std::runtime_error(
+            fmt::format("{}:{}: {}: expected a time in [0, 4e9) s after that of "
+                        "the row before, got {} s",
+                        table_.file, table_.lines[row], table_.columns[map_.time_column], t));
+      }
+    }
+  }
+
+  PoseConvention convention(const Eigen::Isometry3d& on_body) const {
+    const Eigen::Quaterniond orientation(on_body.linear());
+    return {map_.position_unit_m, to_z_up(map_.up), {on_body.translation(), orientation, true}};
+  }
+
+  BodyPose pose(std::size_t row, std::size_t body) const {
+    return convention_[body].to_world(body_in(table_, row, map_.bodies[body]));
+  }
+
+  /// Rows in the window of rest in which every body was seen, those that repeat a frame left out.
+  std::vector<std::size_t> rest_rows() const {
+    std::vector<std::size_t> rows;
+    for (std::size_t row = 0; row < table_.rows(); ++row) {
+      const bool inside = time_s(row) >= map_.rest->from_s && time_s(row) <= map_.rest->to_s;
+      const bool repeated = row > 0 && same_poses(table_, map_, row - 1, row);
+      const bool seen = std::all_of(map_.bodies.begin(), map_.bodies.end(), [&](const auto& body) {
+        return body_in(table_, row, body).valid;
+      });
+      if (inside && seen && !repeated) rows.push_back(row);
+    }
+    if (rows.empty()) {
+      throw std::runtime_error(
+          fmt::format("{}: expected a frame with every body in the window of "
+                      "rest, {} to {} s, got none",
+                      table_.file, map_.rest->from_s, map_.rest->to_s));
+    }
+    return rows;
+  }
+
+  /// Where the frames of an arm that hangs straight at rest sit on the bodies.
+  void learn_rest() {
+    const std::vector<std::size_t> rows = rest_rows();
+    summary_.rest_frames = static_cast<std::int64_t>(rows.size());
+    std::vector<Eigen::Isometry3d> mean;
+    for (std::size_t i = 0; i < map_.bodies.size(); ++i) mean.push_back(mean_pose(i, rows));
+    ArmParameters arm;
+    arm.base_position_m = mean[0].translation();
+    arm.base_rotation = map_.base_rotation;
+    for (std::size_t i = 1; i < map_.bodies.size(); ++i)
+      arm.segments.push_back({.length_m = map_.bodies[i].length_m});
+    const auto frames = frames_on_bodies(arm, Eigen::VectorXd::Zero(arm.dof()), mean);
+    for (std::size_t i = 0; i < frames.size(); ++i) convention_[i] = convention(frames[i]);
+  }
+
+  Eigen::Isometry3d mean_pose(std::size_t body, const std::vector<std::size_t>& rows) {
+    MeanPose mean;
+    for (const std::size_t row : rows) {
+      const BodyPose seen = pose(row, body);
+      mean.add(seen.position_m, seen.orientation);
+    }
+    for (const std::size_t row : rows)
+      summary_.rest_spread_m =
+          std::max(summary_.rest_spread_m, (pose(row, body).position_m - mean.position_m()).norm());
+    if (summary_.rest_spread_m > kMostRestSpread_m)
+      throw std::runtime_error(
+          fmt::format("the arm moves by {:.1f} mm in the rest window of {} to {} s: expected less "
+                      "than {:.0f} mm; "
+                      "give rest.from_s and rest.to_s a window in which it hangs still",
+                      1e3 * summary_.rest_spread_m, map_.rest->from_s, map_.rest->to_s,
+                      1e3 * kMostRestSpread_m));
+    return mean.pose();
+  }
+
+  softarm_messages::mocap_frame_t frame(std::size_t row) {
+    if (row == 0 || !same_poses(table_, map_, row - 1, row)) {
+      begin_frame(row);
+    } else {
+      ++summary_.repeated;
+    }
+    return frame_;
+  }
+
+  void begin_frame(std::size_t row) {
+    std::int64_t steps = 1;
+    if (summary_.frames > 0) {
+      const double gap_s = time_s(row) - time_s(frame_row_);
+      summary_.longest_gap_s = std::max(summary_.longest_gap_s, gap_s);
+      if (map_.frame_period_s) {
+        steps = std::max<std::int64_t>(
+            1, std::llround(std::floor(gap_s / *map_.frame_period_s + 1e-6)));
+      }
+    }
+    summary_.missing += steps - 1;
+    ++summary_.frames;
+    frame_row_ = row;
+    frame_.frame_number += steps;
+    frame_.capture_time_us = time_us(row);
+    frame_.bodies.resize(map_.bodies.size());
+    frame_.num_bodies = static_cast<std::int16_t>(map_.bodies.size());
+    bool all_seen = true;
+    for (std::size_t i = 0; i < map_.bodies.size(); ++i) {
+      const BodyPose seen = pose(row, i);
+      all_seen = all_seen && seen.valid;
+      auto& body = frame_.bodies[i];
+      body = {};
+      body.id = map_.bodies[i].id;
+      body.valid = seen.valid ? 1 : 0;
+      if (!seen.valid) continue;
+      for (int axis = 0; axis < 3; ++axis) body.position_m[axis] = seen.position_m[axis];
+      body.orientation[0] = seen.orientation.w();
+      body.orientation[1] = seen.orientation.x();
+      body.orientation[2] = seen.orientation.y();
+      body.orientation[3] = seen.orientation.z();
+    }
+    if (!all_seen) ++summary_.unseen;
+  }
+
+  std::vector<float> pressures(std::size_t row, const std::vector<std::size_t>& columns) const {
+    std::vector<float> bar;
+    for (const std::size_t column : columns) {
+      bar.push_back(static_cast<float>(map_.pressure_unit_bar * table_.at(row, column)));
+    }
+    return bar;
+  }
+
+  softarm_messages::pressure_command_t command(std::size_t row) const {
+    softarm_messages::pressure_command_t message{};
+    message.sequence = static_cast<std::int64_t>(row) + 1;
+    message.time_us = time_us(row);
+    message.validity_us =
+        static_cast<std::int32_t>(std::llround(1e6 * SafetySettings{}.command_validity_s));
+    message.shadow = 1;
+    message.pressure_bar = pressures(row, map_.commanded);
+    message.num_chambers = static_cast<std::int16_t>(message.pressure_bar.size());
+    return message;
+  }
+
+  softarm_messages::pressure_measurement_t measurement(std::size_t row) const {
+    softarm_messages::pressure_measurement_t message{};
+    message.sequence = map_.commanded.empty() ? -1 : static_cast<std::int64_t>(row) + 1;
+    message.time_us = time_us(row);
+    message.pressure_bar = pressures(row, map_.measured);
+    message.num_chambers = static_cast<std::int16_t>(message.pressure_bar.size());
+    return message;
+  }
+
+  template <class Message>
+  void append(lcm::LogFile& log, const std::string& channel, std::size_t row,
+              const Message& message) {
+    bytes_.resize(static_cast<std::size_t>(message.getEncodedSize()));
+    message.encode(bytes_.data(), 0, static_cast<int>(bytes_.size()));
+    lcm::LogEvent event{};
+    event.timestamp = time_us(row);
+    event.channel = channel;
+    event.datalen = static_cast<std::int32_t>(bytes_.size());
+    event.data = bytes_.data();
+    if (log.writeEvent(&event) != 0) throw std::runtime_error("the log could not be written");
+  }
+
+  const RecordingMap& map_;
+  const CsvTable& table_;
+  std::vector<PoseConvention> convention_;  // of every body, to the segment frame it carries
+  ImportSummary summary_;
+  softarm_messages::mocap_frame_t frame_{};
+  std::size_t frame_row_ = 0;
+  std::vector<std::uint8_t> bytes_;
+};
+
+}  // namespace
+
+ImportSummary import_recording(const MappedTable& recording, const std::filesystem::path& out) {
+  return Importer(recording).write(out);
+}
+
+}  // namespace softarm

@@ -1,0 +1,190 @@
+#include "softarm/recording/recording_map.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <sstream>
+
+#include "softarm/config/keys.hpp"
+#include "softarm/model/arm.hpp"
+#include "softarm/transport/settings.hpp"
+
+namespace softarm {
+namespace {
+
+constexpr auto kRequired = Presence::required;
+/// Of columns. A function: a map may be read before the variables of this file are there.
+Form names() { return from(1, 2000); }
+
+/// The map as it is written: names where RecordingMap has columns.
+struct NamedBody {
+  int id = 0;
+  std::string position, orientation;
+  double length_m = 0.0;
+};
+struct NamedMap {
+  std::string separator = ",";
+  std::string time = "time";
+  NamedBody base;
+  std::vector<NamedBody> segments;
+  std::string commanded, measured;
+  QuaternionOrder order = QuaternionOrder::xyzw;
+  std::optional<double> rest_from_s, rest_to_s;
+};
+
+void describe_body(Keys& key, NamedBody& it) {
+  key("id", it.id, from(0, 1e6), "of the body in our messages", kRequired);
+  key("position", it.position, names(), "names of the three columns x y z", kRequired);
+  key("orientation", it.orientation, names(), "names of the four columns, in quaternion_order",
+      kRequired);
+}
+
+void describe_table(Keys& key, NamedMap& it, RecordingMap& map) {
+  key("separator", it.separator, from(1, 1), "between the cells");
+  key("time", it.time, names(), "name of the time column");
+  key("time_unit_s", map.time_unit_s, above(0, 1e4), "one unit of time");
+  key("position_unit_m", map.position_unit_m, above(0, 1e4), "one unit of position");
+  key("up", map.up, one_of({"x", "y", "z"}), "axis of the world that points up");
+  key("quaternion_order", it.order, one_of({"xyzw", "wxyz"}), "order of orientation columns");
+  key("frame_period_s", map.frame_period_s, above(0, 1e3),
+      "whole periods without a frame count as missing frames");
+}
+
+void describe_rest(Keys& key, NamedMap& it, RecordingMap& map) {
+  key("from_s", it.rest_from_s, Form(), "begin of the window");
+  key("to_s", it.rest_to_s, Form(), "end of the window");
+  key("base_rotation", map.base_rotation, base_rotation(), "of S_0 in the world (z up)");
+}
+
+void describe_pressures(Keys& key, NamedMap& it, RecordingMap& map) {
+  key("unit_bar", map.pressure_unit_bar, above(0, 1e4), "one unit of pressure");
+  key("commanded", it.commanded, names(), "names of columns");
+  key("measured", it.measured, names(), "names of columns");
+}
+
+void describe_channels(Keys& key, RecordingMap& map) {
+  key("mocap", map.mocap_channel, from(1, 62), "of frames");
+  key("command", map.command_channel, from(1, 62), "of what was commanded");
+  key("measurement", map.measurement_channel, from(1, 62), "of what was measured");
+}
+
+void describe_map(Keys& key, NamedMap& it, RecordingMap& map) {
+  describe_table(key, it, map);
+  key.section({"base", "the body at the base of the arm", kRequired},
+              [&] { describe_body(key, it.base); });
+  key.list({"segments", "the bodies at the segments' ends, from the base on", kRequired},
+           it.segments, [&](NamedBody& body) {
+             describe_body(key, body);
+             key("length_m", body.length_m, above(0, 1e3),
+                 "from the body before to this one, at rest", kRequired);
+           });
+  key.section({"rest", "when the arm is still; its pose then reads straight"},
+              [&] { describe_rest(key, it, map); });
+  key.section({"pressures", "what was sent to the valves and what their sensors read"},
+              [&] { describe_pressures(key, it, map); });
+  key.section({"channels", "of the log"}, [&] { describe_channels(key, map); });
+}
+
+/// Turns names into columns of the table, or says which name of the map is not there.
+class ColumnFinder {
+ public:
+  ColumnFinder(const Keys& reader, const CsvTable& table) : reader_(reader), table_(table) {}
+
+  std::vector<std::size_t> find(const std::string& key, const std::string& names,
+                                std::size_t count) const {
+    std::vector<std::size_t> columns;
+    std::istringstream stream(names);
+    for (std::string name; stream >> name;) columns.push_back(one(key, name));
+    if (count != 0 && columns.size() != count) {
+      throw reader_.error_at(key, fmt::format("{} names of columns", count),
+                             fmt::format("{}", columns.size()));
+    }
+    return columns;
+  }
+
+  std::size_t one(const std::string& key, const std::string& name) const {
+    const auto at = std::find(table_.columns.begin(), table_.columns.end(), name);
+    if (at == table_.columns.end()) {
+      throw reader_.error_at(key, fmt::format("a column of {}", table_.file), name);
+    }
+    return static_cast<std::size_t>(at - table_.columns.begin());
+  }
+
+  BodyColumns body(const std::string& key, const NamedBody& named, QuaternionOrder order) const {
+    BodyColumns body;
+    body.id = named.id;
+    body.length_m = named.length_m;
+    const auto position = find(key + ".position", named.position, 3);
+    auto orientation = find(key + ".orientation", named.orientation, 4);
+    if (order == QuaternionOrder::wxyz) {
+      std::rotate(orientation.begin(), orientation.begin() + 1, orientation.end());
+    }
+    std::copy(position.begin(), position.end(), body.position.begin());
+    std::copy(orientation.begin(), orientation.end(), body.orientation.begin());
+    return body;
+  }
+
+ private:
+  const Keys& reader_;
+  const CsvTable& table_;
+};
+
+void check(const Keys& reader, const NamedMap& named, RecordingMap& map) {
+  if (named.segments.size() > static_cast<std::size_t>(kMaxSegments)) {
+    throw reader.error_at("segments", fmt::format("at most {}", kMaxSegments),
+                          fmt::format("{}", named.segments.size()));
+  }
+  std::vector<int> ids{named.base.id};
+  for (std::size_t i = 0; i < named.segments.size(); ++i) {
+    const int id = named.segments[i].id;
+    if (std::find(ids.begin(), ids.end(), id) != ids.end()) {
+      throw reader.error_at(fmt::format("segments[{}].id", i), "an id of its own",
+                            fmt::format("{} again", id));
+    }
+    ids.push_back(id);
+  }
+  if (named.rest_from_s.has_value() != named.rest_to_s.has_value()) {
+    throw reader.error_at("rest", "both from_s and to_s", "one of them");
+  }
+  if (named.rest_from_s) {
+    if (!(*named.rest_to_s > *named.rest_from_s)) {
+      throw reader.error_at("rest.to_s",
+                            fmt::format("a time after from_s ({})", *named.rest_from_s),
+                            fmt::format("{}", *named.rest_to_s));
+    }
+    map.rest = RestWindow{*named.rest_from_s, *named.rest_to_s};
+  }
+  const Eigen::Matrix3d& R = map.base_rotation;
+  if (!(R * R.transpose()).isIdentity(1e-6) || R.determinant() < 0.0) {
+    throw reader.error_at("rest.base_rotation", "a rotation", "a matrix that is none");
+  }
+}
+
+}  // namespace
+
+MappedTable read_mapped_table(const std::filesystem::path& table,
+                              const std::filesystem::path& map) {
+  Keys keys(map);
+  NamedMap named;
+  MappedTable out;
+  const LcmSettings channels;
+  out.map.mocap_channel = channels.mocap_channel;
+  out.map.command_channel = channels.command_channel;
+  out.map.measurement_channel = channels.measurement_channel;
+  keys.visit([&] { describe_map(keys, named, out.map); });
+  check(keys, named, out.map);
+
+  out.table = read_csv(table, named.separator.front());
+  const ColumnFinder finder(keys, out.table);
+  out.map.time_column = finder.one("time", named.time);
+  out.map.bodies.push_back(finder.body("base", named.base, named.order));
+  for (std::size_t i = 0; i < named.segments.size(); ++i) {
+    out.map.bodies.push_back(
+        finder.body(fmt::format("segments[{}]", i), named.segments[i], named.order));
+  }
+  out.map.commanded = finder.find("pressures.commanded", named.commanded, 0);
+  out.map.measured = finder.find("pressures.measured", named.measured, 0);
+  return out;
+}
+
+}  // namespace softarm

@@ -1,0 +1,179 @@
+#include "softarm/recording/status_record.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "softarm/model/kinematics.hpp"
+#include "softarm/transport/message_decoding.hpp"
+#include "softarm/transport/settings.hpp"
+
+namespace softarm {
+namespace {
+
+constexpr std::int64_t kTruthPatience_us =
+    100'000;                                ///< how long a row waits for the plant's word on it
+constexpr std::size_t kWaitingRows = 4096;  ///< more than the patience lasts at any rate
+
+using softarm_messages::plant_state_t;
+
+SegmentVector flatten(const std::vector<std::vector<float>>& pairs) {
+  SegmentVector flat(static_cast<Eigen::Index>(2 * pairs.size()));
+  for (std::size_t i = 0; i < pairs.size(); ++i)
+    for (std::size_t axis = 0; axis < 2; ++axis)
+      flat[static_cast<Eigen::Index>(2 * i + axis)] = pairs[i][axis];
+  return flat;
+}
+
+template <class Vector>
+Vector to_vector(const std::vector<float>& values) {
+  return Eigen::Map<const Eigen::VectorXf>(values.data(), static_cast<Eigen::Index>(values.size()))
+      .cast<double>();
+}
+
+}  // namespace
+
+void TruthTrack::add(const plant_state_t& state) {
+  before_ = std::move(after_);
+  after_ = state;
+}
+void TruthTrack::fill(std::int64_t time_us, LogRow& row) const {
+  if (!before_ || !after_ || time_us < before_->time_us || time_us > after_->time_us) return;
+  const auto span =
+      static_cast<double>(std::max<std::int64_t>(1, after_->time_us - before_->time_us));
+  const double s = static_cast<double>(time_us - before_->time_us) / span;
+  // Cubic through both ends with the velocities told there: exact to h^4/384 of the fourth
+  // derivative.
+  const double h = 1e-6 * span;
+  const double weights[] = {(1 + 2 * s) * (1 - s) * (1 - s), h * s * (1 - s) * (1 - s),
+                            s * s * (3 - 2 * s), h * s * s * (s - 1)};
+  const auto pair = [&](const std::vector<std::vector<double>>& from, std::size_t i,
+                        std::size_t axis) { return from[i][axis]; };
+  row.truth.resize(static_cast<Eigen::Index>(2 * after_->u_rad.size()));
+  for (std::size_t i = 0; i < after_->u_rad.size(); ++i)
+    for (std::size_t axis = 0; axis < 2; ++axis)
+      row.truth[static_cast<Eigen::Index>(2 * i + axis)] =
+          weights[0] * pair(before_->u_rad, i, axis) +
+          weights[1] * pair(before_->velocity_radps, i, axis) +
+          weights[2] * pair(after_->u_rad, i, axis) +
+          weights[3] * pair(after_->velocity_radps, i, axis);
+  row.real = to_vector<PressureVector>(after_->pressure_bar);
+  Eigen::Vector3d tip;
+  for (int axis = 0; axis < 3; ++axis)
+    tip[axis] = (1 - s) * before_->tip_m[axis] + s * after_->tip_m[axis];
+  row.tip = tip;
+}
+
+StatusRecord::StatusRecord(const Experiment& experiment, const std::filesystem::path& folder)
+    : experiment_(experiment),
+      folder_(folder),
+      summary_(experiment.arm.size(), experiment.run.tracking_from_s) {
+  if (experiment.actuation.kind == ActuationKind::torque) summary_.commands_are_torques();
+  if (!folder.empty()) log_.emplace(folder, experiment);
+}
+
+bool StatusRecord::take(std::string_view channel, std::span<const std::byte> bytes) {
+  const LcmSettings& lcm = experiment_.transport.lcm;
+  if (channel == lcm.status_channel) return take_status(bytes);
+  if (channel == lcm.plant_channel) {
+    if (decode(bytes, plant_message_) && plant_message_.num_segments == experiment_.arm.size())
+      truth_.add(plant_message_);
+  } else if (channel == lcm.timing_channel) {
+    timing_received_ |= decode(bytes, timing_);
+  }
+  return false;
+}
+
+bool StatusRecord::take_status(std::span<const std::byte> bytes) {
+  if (!decode(bytes, decoded_) || decoded_.num_segments != experiment_.arm.size()) return false;
+  // A shadow may be watched alone; beside the daemon that moves the arm it is not what is asked
+  // for.
+  const bool shadow = (decoded_.flags & decoded_.SHADOW) != 0;
+  if (shadow && commander_heard_) return false;
+  commander_heard_ = !shadow;
+  std::swap(status_, decoded_);
+  // The reference in a status belongs to the middle of the period that begins with its tick.
+  const double period_s = 1.0 / experiment_.rate_hz;
+  const std::int64_t time_us = status_.time_us + static_cast<std::int64_t>(0.5e6 * period_s);
+  if (rows_++ == 0) start_us_ = time_us;
+  if (waiting_.size() >= kWaitingRows) return true;
+  LogRow row;
+  row.t_s = 1e-6 * static_cast<double>(time_us - start_us_);
+  row.mode = static_cast<Mode>(std::clamp<int>(status_.mode, 0, static_cast<int>(Mode::fault)));
+  row.reason = static_cast<Reason>(std::clamp<int>(status_.reason, 0, kReasons - 1));
+  row.saturated = (status_.flags & status_.SATURATED) != 0;
+  row.frame_age_s = status_.frame_age_s;
+  row.u = flatten(status_.u_rad);
+  row.velocity = flatten(status_.velocity_radps);
+  row.residual_twist = to_vector<SegmentVector>(status_.residual_twist_rad);
+  row.residual_length = to_vector<SegmentVector>(status_.residual_length_m);
+  row.commanded = to_vector<PressureVector>(status_.pressure_bar);
+  if (row.mode == Mode::active) {
+    row.reference = flatten(status_.reference_u_rad);
+    row.tau_actuation = flatten(status_.tau_actuation_nm);
+    row.tip_reference = tip_position(experiment_.arm, row.reference);
+    active_s_ += period_s;
+  }
+  waiting_.push_back({time_us, std::move(row)});
+  return true;
+}
+
+void StatusRecord::write_rows(bool all) {
+  const std::int64_t newest_us = waiting_.empty() ? 0 : waiting_.back().time_us;
+  while (!waiting_.empty()) {
+    WaitingRow& next = waiting_.front();
+    if (!all && !truth_.reaches(next.time_us) && newest_us - next.time_us < kTruthPatience_us)
+      return;
+    truth_.fill(next.time_us, next.row);
+    if (log_) log_->add(next.row);
+    summary_.add(next.row, 1.0 / experiment_.rate_hz);
+    waiting_.pop_front();
+  }
+}
+
+void StatusRecord::close() {
+  write_rows(true);
+  if (!log_) return;
+  log_->close();
+  write_text(folder_ / "summary.json", summary_.json());
+  write_text(folder_ / "timing.json", timing_text());
+}
+
+std::string StatusRecord::table() const {
+  return summary_.table() + (timing_received_ ? timing_table() : "");
+}
+
+double StatusRecord::time_s() const {
+  return 1e-6 * static_cast<double>(std::max(status_.time_us, start_us_) - start_us_);
+}
+
+std::string StatusRecord::timing_text() const {
+  const auto named = [this](const char* name, const std::int32_t(&counts)[32], int k) {
+    TimingReport::Named result{name, {}, timing_.max_us[k]};
+    std::copy(std::begin(counts), std::end(counts), result.counts.begin());
+    return result;
+  };
+  TimingReport report{.real_time_factor = 1.0, .histograms = {}};
+  if (timing_received_)
+    report.histograms = {named("lateness_us", timing_.lateness_count, 0),
+                         named("frame_age_us", timing_.frame_age_count, 1),
+                         named("tick_us", timing_.tick_count, 2),
+                         named("publish_us", timing_.publish_count, 3)};
+  return timing_json(report);
+}
+
+std::string StatusRecord::timing_table() const {
+  DurationCounts tick, lateness;
+  std::copy(std::begin(timing_.tick_count), std::end(timing_.tick_count), tick.begin());
+  std::copy(std::begin(timing_.lateness_count), std::end(timing_.lateness_count), lateness.begin());
+  return fmt::format(
+      "tick p50 < {:.1f} us, p99 < {:.1f} us, max {:.0f} us; woken late p50 < {:.0f} us, p99 < "
+      "{:.0f} us, max {:.0f} us; "
+      "{} of {} deadlines missed\n",
+      quantile_us(tick, 0.5), quantile_us(tick, 0.99), timing_.max_us[2],
+      quantile_us(lateness, 0.5), quantile_us(lateness, 0.99), timing_.max_us[0], timing_.overruns,
+      timing_.ticks + timing_.overruns);
+}
+
+}  // namespace softarm

@@ -1,0 +1,253 @@
+#include "softarm/runtime/control_pipeline.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "softarm/base/time.hpp"
+#include "softarm/runtime/settings.hpp"
+
+namespace softarm {
+namespace {
+
+/// The arm may overshoot what its reference may not exceed, by so much.
+constexpr double kSoftLimitMargin = 1.1;
+/// A command that has moved by so much must move the arm, unless the poses are frozen.
+constexpr double kFrozenCommandChange_bar = 0.05;
+
+}  // namespace
+
+ControlPipeline::ControlPipeline(const PipelineSettings& settings)
+    : settings_(settings),
+      period_ns_(to_ns(1.0 / settings.rate_hz)),
+      period_s_(1.0 / settings.rate_hz),
+      validator_(settings.estimation, settings.arm,
+                 body_noise(settings.estimation, settings.arm.size())),
+      filter_(settings.estimation, settings.arm.size()),
+      safety_(settings.safety, period_s_),
+      reference_(settings.reference, settings.control, settings.arm),
+      controller_(settings.arm, settings.control),
+      allocator_(settings.actuation),
+      ramps_(settings.actuation),
+      pressure_watch_(settings.safety, allocator_.chambers()),
+      curvature_watch_(settings.safety, settings.arm),
+      previous_bar_(PressureVector::Zero(allocator_.chambers())),
+      previous_tau_nm_(SegmentVector::Zero(settings.arm.dof())),
+      pressure_at_last_motion_bar_(previous_bar_) {
+  seen_ns_.fill(kNever);
+  output_.pressure_bar = previous_bar_;
+}
+
+const TickOutput& ControlPipeline::tick(const TickInput& input) noexcept {
+  if (!ticked_) epoch_ns_ = input.now_ns;
+  if (input.command_expired) forget_command();
+  SafetyInput safety;
+  validate_and_estimate(input, safety);
+
+  // The command is held over the coming period: it is computed for the middle of it.
+  const std::int64_t act_ns = input.now_ns + period_ns_ / 2;
+  predict(act_ns);
+  safety.motion_unknown = !output_.motion.all_valid();
+  safety.command_expired = input.command_expired && ticked_;
+  watch(input, safety);
+
+  const Mode before = safety_.mode();
+  const Mode mode = safety_.step(safety);
+  if (mode == Mode::active && before != Mode::active) {
+    // Frozen or vented for so many good frames the arm is at rest; its measured velocity would only
+    // be noise.
+    const SegmentVector at_rest = SegmentVector::Zero(settings_.arm.dof());
+    reference_.start(seconds(act_ns), output_.motion.u_rad, at_rest);
+    controller_.reset_integral();
+    ++activations_;
+  }
+  take_reference(input);
+  if (mode == Mode::active) {
+    reference_.advance(seconds(act_ns));
+    reference_.window(seconds(act_ns), controller_.lookahead_s(), window_);
+    control();
+  }
+  limit(mode);
+  pressure_watch_.command(input.now_ns, output_.pressure_bar);
+
+  output_.mode = mode;
+  output_.reason = safety_.reason();
+  output_.armed = safety_.armed();
+  previous_ns_ = input.now_ns;
+  ticked_ = true;
+  return output_;
+}
+
+/// The valves have vented: pressures rise from zero again, within the slew.
+void ControlPipeline::forget_command() noexcept {
+  previous_bar_.setZero();
+  output_.pressure_bar.setZero();
+  pressure_watch_.reset();
+}
+
+void ControlPipeline::validate_and_estimate(const TickInput& input, SafetyInput& safety) noexcept {
+  // After a stop of this process anything may have happened: what is queued is history, not
+  // measurement.
+  const bool gap = ticked_ && input.now_ns - previous_ns_ > safety_.thresholds().vent_after_ns;
+  if (gap) {
+    validator_.reset();
+    filter_.reset();
+    pressure_watch_.reset();
+    curvature_watch_.reset();
+  }
+  const std::int64_t max_latency_ns = to_ns(settings_.safety.max_latency_s);
+  for (const MocapFrame& frame : input.frames) {
+    if (gap) break;
+    // A capture yet to come would make all after it look old, and its age hide the silence of the
+    // sender.
+    if (frame.capture_ns < input.now_ns - max_latency_ns || frame.capture_ns > input.now_ns) {
+      ++late_frames_;
+      ++safety.bad_frames;
+      continue;
+    }
+    const FrameVerdict verdict = validator_.accept(frame);
+    safety.sender_restarted |= verdict == FrameVerdict::sender_restarted;
+    if (verdict == FrameVerdict::repeated) continue;
+    if (verdict != FrameVerdict::accepted) {
+      ++safety.bad_frames;
+      continue;
+    }
+    use_frame(frame);
+    const auto& seen = validator_.estimate().valid;
+    const bool complete = std::all_of(seen.begin(), seen.begin() + settings_.arm.size(),
+                                      [](bool each) { return each; });
+    ++(complete ? safety.good_frames : safety.bad_frames);
+  }
+  safety.now_ns = input.now_ns;
+  safety.newest_capture_ns =
+      *std::min_element(seen_ns_.begin(), seen_ns_.begin() + settings_.arm.size());
+  safety.poses_frozen = poses_frozen();
+  // In HOLD only while the arm is seen, as what is predicted longer than that is no evidence, and
+  // by its bend alone: where it is seen again after a while, the filter takes the way for speed.
+  const bool held_and_seen =
+      safety_.mode() == Mode::hold && safety.newest_capture_ns != kNever &&
+      input.now_ns - safety.newest_capture_ns <= safety_.thresholds().hold_after_ns;
+  safety.soft_limit_exceeded = (safety_.mode() == Mode::active && beyond_soft_limit(true)) ||
+                               (held_and_seen && beyond_soft_limit(false));
+  safety.fully_vented = fully_vented();
+  safety.consecutive_overruns = input.consecutive_overruns;
+  safety.newest_measurement_ns = input.newest_measurement_ns;
+  safety.deadman_used = settings_.safety.deadman;
+  safety.newest_go_ns = input.newest_go_ns;
+  safety.arm = input.arm;
+  safety.disarm = input.disarm;
+  safety.emergency_stop = input.emergency_stop;
+  safety.shutdown = input.shutdown;
+  output_.soft_limit = safety.soft_limit_exceeded;
+  output_.frame_age_s = newest_capture_ns_ == kNever
+                            ? std::numeric_limits<double>::quiet_NaN()
+                            : to_seconds(input.now_ns - newest_capture_ns_);
+}
+
+void ControlPipeline::watch(const TickInput& input, SafetyInput& safety) noexcept {
+  if (input.measured_bar != nullptr && input.measured_bar->size() == previous_bar_.size())
+    pressure_watch_.measure(*input.measured_bar);
+  safety.pressure_mismatch = settings_.safety.valve_readback && pressure_watch_.strays();
+  if (!curvature_watch_.used()) return;
+  // What is judged is the balance of an arm that is watched and told what to do.
+  const bool under_control = safety_.mode() == Mode::active || safety_.mode() == Mode::hold;
+  if (under_control && !safety.motion_unknown) {
+    allocator_.torque(previous_bar_, previous_tau_nm_);
+    curvature_watch_.judge(input.now_ns, output_.motion.u_rad, previous_tau_nm_);
+  } else {
+    curvature_watch_.reset();
+  }
+  safety.curvature_mismatch = curvature_watch_.strays();
+}
+
+void ControlPipeline::use_frame(const MocapFrame& frame) noexcept {
+  const CurvatureEstimate& estimate = validator_.estimate();
+  for (int i = 0; i < settings_.arm.size(); ++i)
+    if (estimate.valid[static_cast<std::size_t>(i)])
+      seen_ns_[static_cast<std::size_t>(i)] = frame.capture_ns;
+  if (validator_.identical_in_row() == 0) pressure_at_last_motion_bar_ = previous_bar_;
+  newest_capture_ns_ = frame.capture_ns;
+  output_.frame_number = frame.frame_number;
+  const BodyPose& tip = frame.body[static_cast<std::size_t>(settings_.arm.size())];
+  if (tip.valid) reference_.measure_tip(seconds(frame.capture_ns), tip.position_m);
+
+  // Under control the arm is expected to do what it is told; the filter then smooths only the rest.
+  const bool expects = safety_.mode() == Mode::active;
+  if (expects) expect(frame.capture_ns);
+  filter_.update(frame.capture_ns, estimate, expects ? &known_ : nullptr);
+}
+
+void ControlPipeline::predict(std::int64_t at_ns) noexcept {
+  const bool expects = safety_.mode() == Mode::active;
+  if (expects) expect(at_ns);
+  filter_.predict(at_ns, output_.motion, expects ? &known_ : nullptr);
+}
+
+void ControlPipeline::expect(std::int64_t at_ns) noexcept {
+  reference_.sample(seconds(at_ns), window_.now);
+  known_ = {window_.now.u, window_.now.velocity, window_.now.acceleration, activations_};
+}
+
+void ControlPipeline::take_reference(const TickInput& input) noexcept {
+  output_.reference_limited = false;
+  if (input.reference == nullptr || safety_.mode() != Mode::active) return;
+  const LiveVerdict verdict =
+      reference_.receive(seconds(input.now_ns), input.reference->u, input.reference->velocity,
+                         input.reference->acceleration);
+  output_.reference_limited = verdict != LiveVerdict::accepted && verdict != LiveVerdict::not_live;
+}
+
+void ControlPipeline::control() noexcept {
+  controller_.compute(output_.motion.u_rad, output_.motion.velocity_radps, window_, control_);
+  allocator_.allocate(control_.tau_actuation_nm, allocation_);
+  controller_.integrate(period_s_, output_.motion.u_rad, window_.now, allocation_.scale);
+  output_.reference = window_.now;
+  output_.reference_limited |= window_.now.limited;
+  output_.tau_actuation_nm = control_.tau_actuation_nm;
+  output_.bounded = control_.bounded;
+  output_.saturated = allocation_.saturated;
+}
+
+void ControlPipeline::limit(Mode mode) noexcept {
+  output_.slew_limited = false;
+  switch (mode) {
+    case Mode::active:
+      ramps_.limit(previous_bar_, allocation_.pressures_bar, period_s_, output_.pressure_bar);
+      output_.slew_limited = output_.pressure_bar != allocation_.pressures_bar;
+      break;
+    case Mode::hold:
+      break;
+    case Mode::init:
+    case Mode::wait_frames:
+    case Mode::vent:
+    case Mode::fault:
+      ramps_.vent(previous_bar_, period_s_, output_.pressure_bar);
+      break;
+  }
+  if (mode != Mode::active) {
+    output_.saturated = output_.bounded = false;
+    output_.reference.u.resize(0);
+    output_.tau_actuation_nm.resize(0);
+  }
+  previous_bar_ = output_.pressure_bar;
+}
+
+bool ControlPipeline::poses_frozen() const noexcept {
+  const int frozen = settings_.safety.frozen_frames;
+  return frozen > 0 && validator_.identical_in_row() >= frozen &&
+         (previous_bar_ - pressure_at_last_motion_bar_).cwiseAbs().maxCoeff() >
+             kFrozenCommandChange_bar;
+}
+
+bool ControlPipeline::beyond_soft_limit(bool speed_too) const noexcept {
+  const FilteredMotion& motion = output_.motion;
+  for (int i = 0; i < motion.segments; ++i) {
+    if (motion.u_rad.segment<2>(2 * i).norm() >
+            kSoftLimitMargin * settings_.control.max_theta_rad ||
+        (speed_too && motion.velocity_radps.segment<2>(2 * i).norm() >
+                          kSoftLimitMargin * settings_.control.max_speed_radps))
+      return true;
+  }
+  return false;
+}
+
+}  // namespace softarm

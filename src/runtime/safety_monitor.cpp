@@ -1,0 +1,285 @@
+#include "softarm/runtime/safety_monitor.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "softarm/base/time.hpp"
+#include "softarm/runtime/settings.hpp"
+
+namespace softarm {
+namespace {
+
+/// So long after a stop of the daemon what is handled may have been sent before its end: it queues
+/// in the kernel.
+constexpr std::int64_t kStale_ns = 500'000'000;
+
+/// Everything a cause may look at.
+struct Evidence {
+  const SafetyInput& input;
+  const SafetySettings& settings;
+  const SafetyThresholds& thresholds;
+  Mode mode;
+  std::int64_t frame_age_ns;
+  std::int64_t tick_gap_ns;
+  std::int64_t measurement_age_ns;
+  std::int64_t go_age_ns;
+
+  /// Pressure is commanded, or may be in the next tick.
+  bool pressurised() const {
+    return mode == Mode::active || mode == Mode::hold || !input.fully_vented;
+  }
+  bool valves_silent() const {
+    return settings.valve_readback && measurement_age_ns > thresholds.valve_silence_ns;
+  }
+};
+
+struct Cause {
+  CauseRule rule;
+  bool (*present)(const Evidence&);
+};
+
+/// Every cause, the most severe first: `shutdown` because nothing follows it, then by what they
+/// demand. Valves that are silent or do not follow are a fault where there is pressure; where there
+/// is none they only keep the arm from becoming active, so that valves may be switched on after the
+/// daemon. Overruns are ticks missed in a row, and judged only under SCHED_FIFO
+/// (consecutive_overruns is zero otherwise): without it they are only counted.
+constexpr std::array kCauses{
+    Cause{{Reason::shutdown, Mode::vent, Clearance::never},
+          [](const Evidence& e) { return e.input.shutdown; }},
+    Cause{{Reason::emergency_stop, Mode::fault, Clearance::disarm_then_arm},
+          [](const Evidence& e) { return e.input.emergency_stop; }},
+    Cause{{Reason::valves_silent, Mode::fault, Clearance::disarm_then_arm},
+          [](const Evidence& e) { return e.valves_silent() && e.pressurised(); }},
+    Cause{{Reason::pressure_mismatch, Mode::fault, Clearance::disarm_then_arm},
+          [](const Evidence& e) { return e.input.pressure_mismatch && e.pressurised(); }},
+    Cause{{Reason::curvature_mismatch, Mode::fault, Clearance::disarm_then_arm},
+          [](const Evidence& e) { return e.input.curvature_mismatch; }},
+    Cause{{Reason::disarmed, Mode::vent, Clearance::arm},
+          [](const Evidence& e) { return e.input.disarm; }},
+    Cause{{Reason::deadman_released, Mode::vent, Clearance::arm},
+          [](const Evidence& e) {
+            return e.input.deadman_used && e.go_age_ns > e.thresholds.deadman_timeout_ns;
+          }},
+    Cause{{Reason::valves_silent, Mode::vent, Clearance::good_frames},
+          [](const Evidence& e) { return e.valves_silent(); }},
+    Cause{{Reason::pressure_mismatch, Mode::vent, Clearance::good_frames},
+          [](const Evidence& e) { return e.input.pressure_mismatch; }},
+    Cause{{Reason::time_gap, Mode::vent, Clearance::good_frames},
+          [](const Evidence& e) { return e.tick_gap_ns > e.thresholds.vent_after_ns; }},
+    Cause{{Reason::command_expired, Mode::vent, Clearance::good_frames},
+          [](const Evidence& e) { return e.input.command_expired; }},
+    Cause{{Reason::sender_restarted, Mode::vent, Clearance::good_frames},
+          [](const Evidence& e) { return e.input.sender_restarted; }},
+    Cause{{Reason::frames_stale, Mode::vent, Clearance::good_frames},
+          [](const Evidence& e) { return e.frame_age_ns > e.thresholds.vent_after_ns; }},
+    Cause{{Reason::soft_limit, Mode::vent, Clearance::arm},
+          [](const Evidence& e) { return e.input.soft_limit_exceeded; }},
+    Cause{{Reason::many_overruns, Mode::vent, Clearance::good_frames},
+          [](const Evidence& e) {
+            return e.settings.vent_overruns > 0 &&
+                   e.input.consecutive_overruns >= e.settings.vent_overruns;
+          }},
+    Cause{{Reason::frames_late, Mode::hold, Clearance::good_frames},
+          [](const Evidence& e) {
+            return e.input.motion_unknown || e.frame_age_ns > e.thresholds.hold_after_ns;
+          }},
+    Cause{{Reason::poses_frozen, Mode::hold, Clearance::good_frames},
+          [](const Evidence& e) { return e.input.poses_frozen; }},
+    Cause{{Reason::overruns, Mode::hold, Clearance::good_frames},
+          [](const Evidence& e) {
+            return e.settings.hold_overruns > 0 &&
+                   e.input.consecutive_overruns >= e.settings.hold_overruns;
+          }},
+};
+
+constexpr auto kRules = [] {
+  std::array<CauseRule, kCauses.size()> rules{};
+  for (std::size_t k = 0; k < rules.size(); ++k) rules[k] = kCauses[k].rule;
+  return rules;
+}();
+
+/// The values named may come off the wire.
+template <class Enumeration, std::size_t count>
+const char* name_of(Enumeration value, const std::array<const char*, count>& names) noexcept {
+  const auto index = static_cast<std::size_t>(value);
+  return index < count ? names[index] : "unknown";
+}
+
+}  // namespace
+
+const char* name(Mode mode) noexcept {
+  constexpr std::array kNames{"INIT", "WAIT_FRAMES", "ACTIVE", "HOLD", "VENT", "FAULT"};
+  return name_of(mode, kNames);
+}
+
+const char* name(Reason reason) noexcept {
+  constexpr std::array kNames{"none",
+                              "starting",
+                              "waiting_for_frames",
+                              "waiting_for_arm",
+                              "frames_late",
+                              "poses_frozen",
+                              "overruns",
+                              "frames_stale",
+                              "sender_restarted",
+                              "soft_limit",
+                              "time_gap",
+                              "many_overruns",
+                              "disarmed",
+                              "shutdown",
+                              "valves_silent",
+                              "emergency_stop",
+                              "deadman_released",
+                              "pressure_mismatch",
+                              "curvature_mismatch",
+                              "command_expired"};
+  static_assert(kNames.size() == static_cast<std::size_t>(kReasons));
+  return name_of(reason, kNames);
+}
+
+std::span<const CauseRule> cause_table() noexcept { return kRules; }
+
+SafetyThresholds resolve_thresholds(const SafetySettings& settings,
+                                    double control_period_s) noexcept {
+  const double hold_s = settings.hold_after_s > 0.0
+                            ? settings.hold_after_s
+                            : std::max(3.0 * control_period_s,
+                                       3.0 * settings.frame_period_s + settings.frame_latency_s);
+  const double vent_s =
+      settings.vent_after_s > 0.0
+          ? settings.vent_after_s
+          : std::max({0.1, 10.0 * settings.frame_period_s, 3.0 * control_period_s});
+  return {.hold_after_ns = to_ns(hold_s),
+          .vent_after_ns = to_ns(vent_s),
+          .valve_silence_ns = to_ns(settings.valve_silence_s),
+          .deadman_timeout_ns = to_ns(settings.deadman_timeout_s)};
+}
+
+SafetyMonitor::SafetyMonitor(const SafetySettings& settings, double control_period_s) noexcept
+    : settings_(settings),
+      thresholds_(resolve_thresholds(settings, control_period_s)),
+      armed_(settings.arming == Arming::automatic) {}
+
+/// LCM drops the newest messages when a queue is full: after a stop longer than valves may be
+/// silent their newest measurement looks old although they never were. Where nothing was heard
+/// since the stop before, another one changes nothing.
+void SafetyMonitor::note_stop(const SafetyInput& input) noexcept {
+  if (mode_ == Mode::init) return;
+  const std::int64_t stopped_ns = input.now_ns - previous_tick_ns_;
+  if (stopped_ns > thresholds_.vent_after_ns || input.command_expired)
+    deaf_until_ns_ = input.now_ns + kStale_ns;
+  if (stopped_ns > thresholds_.valve_silence_ns &&
+      input.newest_measurement_ns > listening_since_ns_)
+    listening_since_ns_ = input.now_ns;
+}
+
+CauseRule SafetyMonitor::worst_cause(const SafetyInput& input) const noexcept {
+  const bool ticked_before = mode_ != Mode::init;
+  const Evidence evidence{
+      .input = input,
+      .settings = settings_,
+      .thresholds = thresholds_,
+      .mode = mode_,
+      .frame_age_ns = age_ns(input.now_ns, input.newest_capture_ns),
+      .tick_gap_ns = ticked_before ? input.now_ns - previous_tick_ns_ : 0,
+      .measurement_age_ns =
+          input.newest_measurement_ns == kNever
+              ? kForever
+              : input.now_ns - std::max(input.newest_measurement_ns, listening_since_ns_),
+      .go_age_ns = age_ns(input.now_ns, input.newest_go_ns)};
+  for (const Cause& cause : kCauses)
+    if (cause.present(evidence)) return cause.rule;
+  return {Reason::none, Mode::active, Clearance::good_frames};
+}
+
+void SafetyMonitor::take_operator_requests(const SafetyInput& input, Mode demanded) noexcept {
+  // Armed is granted for what the operator sees now, never stored up for when a cause has gone, nor
+  // for what queued up in the kernel while we were stopped and comes in as if it were new.
+  if (input.arm && demanded < Mode::vent && mode_ != Mode::fault && input.now_ns >= deaf_until_ns_)
+    armed_ = true;
+  if (input.disarm || input.shutdown) armed_ = false;
+}
+
+void SafetyMonitor::enter(const CauseRule& cause) noexcept {
+  // With automatic arming a vent gives the arming back by itself, but not to an arm that ran beyond
+  // its limits (it would do so again and again), nor against a person's will.
+  if (cause.demands >= Mode::vent && cause.clearance != Clearance::good_frames) armed_ = false;
+  mode_ = cause.demands;
+  reason_ = cause.reason;
+}
+
+void SafetyMonitor::try_to_activate(const SafetyInput& input, Reason otherwise) noexcept {
+  const bool vented_enough = mode_ == Mode::hold || input.fully_vented;
+  if (!vented_enough) return;
+  if (good_in_a_row_ < settings_.good_frames) {
+    reason_ = otherwise;
+  } else if (!armed_) {
+    reason_ = Reason::waiting_for_arm;
+  } else {
+    mode_ = Mode::active;
+    reason_ = Reason::none;
+  }
+}
+
+Mode SafetyMonitor::step(const SafetyInput& input) noexcept {
+  note_stop(input);
+  const CauseRule worst = worst_cause(input);
+  take_operator_requests(input, worst.demands);
+  // In WAIT_FRAMES too, which such a cause does not leave.
+  if (worst.demands >= Mode::vent && settings_.arming == Arming::explicit_) armed_ = false;
+  previous_tick_ns_ = input.now_ns;
+  if (mode_ == Mode::init) {
+    mode_ = Mode::wait_frames;
+    reason_ = Reason::waiting_for_frames;
+  }
+
+  // A run of good frames is one without a cause, a rejection, a gap or silent valves, and begins
+  // anew with the arm vented (until then it is moving), and when what queued up is through.
+  const bool still_venting = mode_ >= Mode::vent && !input.fully_vented;
+  const bool unheard = settings_.valve_readback && listening_since_ns_ != kNever &&
+                       input.newest_measurement_ns <= listening_since_ns_;
+  const bool deaf = input.now_ns < deaf_until_ns_;
+  if (worst.demands > Mode::active || input.bad_frames > 0 || still_venting || unheard || deaf) {
+    good_in_a_row_ = 0;
+  } else {
+    good_in_a_row_ = std::min(good_in_a_row_ + input.good_frames, settings_.good_frames);
+  }
+
+  switch (mode_) {
+    case Mode::init:
+    case Mode::wait_frames:
+      if (worst.demands == Mode::fault || worst.clearance == Clearance::never) {
+        enter(worst);
+      } else {
+        const bool by_frames = worst.demands < Mode::vent || worst.reason == Reason::frames_stale;
+        try_to_activate(input, by_frames ? Reason::waiting_for_frames : worst.reason);
+      }
+      break;
+    case Mode::active:
+    case Mode::hold:
+      if (worst.demands > Mode::active && worst.demands >= mode_) {
+        enter(worst);
+      } else if (mode_ == Mode::hold) {
+        try_to_activate(input, reason_);
+      }
+      break;
+    case Mode::vent:
+      if (worst.demands >= Mode::vent) {
+        enter(worst);
+      } else if (worst.demands == Mode::active) {
+        try_to_activate(input, reason_);
+      }
+      break;
+    case Mode::fault:
+      // Disarming acknowledges a fault whose cause has gone; the arm stays vented until it is armed
+      // again. An emergency stop is told even where a fault came before it.
+      if (worst.reason == Reason::emergency_stop || worst.clearance == Clearance::never ||
+          (input.disarm && worst.demands < Mode::fault))
+        enter(worst);
+      break;
+  }
+  return mode_;
+}
+
+}  // namespace softarm

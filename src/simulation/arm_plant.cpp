@@ -1,0 +1,276 @@
+#include "softarm/simulation/arm_plant.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <deque>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "simulation/integrator.hpp"
+#include "simulation/plant_system.hpp"
+#include "softarm/actuation/input_map.hpp"
+
+namespace softarm {
+namespace {
+
+void expect(bool holds, const std::string& expected, const std::string& got) {
+  if (!holds) {
+    throw std::invalid_argument("plant: expected " + expected + ", got " + got);
+  }
+}
+
+const PlantSettings& checked(const PlantSettings& settings) {
+  const int n = settings.arm.size();
+  expect(n >= 1 && n <= kMaxSegments, "1 to " + std::to_string(kMaxSegments) + " segments",
+         std::to_string(n));
+  expect(static_cast<int>(settings.actuation.segments.size()) == n,
+         "chambers for " + std::to_string(n) + " segments",
+         std::to_string(settings.actuation.segments.size()));
+  expect(settings.initial_u_rad.size() == 0 || settings.initial_u_rad.size() == 2 * n,
+         std::to_string(2 * n) + " numbers in initial_u",
+         std::to_string(settings.initial_u_rad.size()));
+  expect(settings.initial_u_rad.allFinite(), "finite numbers in initial_u", "others");
+  expect(settings.tip_force_n.allFinite(), "a finite tip force", "another");
+  expect(settings.payload_kg.empty() || static_cast<int>(settings.payload_kg.size()) == n,
+         std::to_string(n) + " payloads", std::to_string(settings.payload_kg.size()));
+  for (const double payload : settings.payload_kg) {
+    expect(std::isfinite(payload) && payload >= 0.0, "payloads >= 0 kg", std::to_string(payload));
+  }
+  expect(settings.arm.gravity_mps2.allFinite(), "finite gravity", "another");
+  for (const SegmentParameters& segment : settings.arm.segments) {
+    expect(std::isfinite(segment.length_m) && segment.length_m > 0.0, "lengths > 0 m",
+           std::to_string(segment.length_m));
+    expect(std::isfinite(segment.mass_kg) && segment.mass_kg > 0.0, "masses > 0 kg",
+           std::to_string(segment.mass_kg));
+    expect(std::isfinite(segment.stiffness_nm_per_rad) && segment.stiffness_nm_per_rad >= 0.0,
+           "stiffnesses >= 0 N m/rad", std::to_string(segment.stiffness_nm_per_rad));
+    expect(std::isfinite(segment.radius_m) && segment.radius_m >= 0.0, "radii >= 0 m",
+           std::to_string(segment.radius_m));
+    expect(std::isfinite(segment.damping_nms_per_rad) && segment.damping_nms_per_rad >= 0.0,
+           "damping >= 0 N m s/rad", std::to_string(segment.damping_nms_per_rad));
+  }
+  for (const auto& segment : settings.actuation.segments) {
+    expect(settings.actuation.kind != ActuationKind::torque || segment.size() == 2,
+           "two moments a segment", std::to_string(segment.size()));
+    for (const Chamber& chamber : segment) {
+      expect(std::isfinite(chamber.angle_rad) && std::isfinite(chamber.gain_nm_per_bar),
+             "finite chamber angles and gains", "others");
+    }
+  }
+  return settings;
+}
+
+IntegratorSettings integrator_settings(const PlantSettings& settings) {
+  return {.method = settings.method,
+          .relative_tolerance = settings.relative_tolerance,
+          .absolute_tolerance = settings.absolute_tolerance,
+          .absolute_tolerance_velocity = kVelocityTolerance * settings.absolute_tolerance,
+          .max_step_s = settings.max_step_s,
+          .account_energy = settings.account_energy};
+}
+
+}  // namespace
+
+struct ArmPlant::Implementation {
+  explicit Implementation(const PlantSettings& settings)
+      : arm(checked(settings).arm),
+        lag_s(settings.valves.lag_s),
+        dead_time_s(settings.valves.dead_time_s),
+        valves(settings.valves, chamber_count(settings.actuation),
+               settings.actuation.kind == ActuationKind::torque),
+        map(input_map(settings.actuation)),
+        system(make_plant_system(settings)),
+        integrator(make_integrator(*system, integrator_settings(settings))),
+        present_nm(Eigen::VectorXd::Zero(arm.dof())),
+        target_nm(Eigen::VectorXd::Zero(arm.dof())),
+        driven_nm(Eigen::VectorXd::Zero(arm.dof())),
+        ends(static_cast<std::size_t>(arm.size())) {
+    Eigen::VectorXd u = Eigen::VectorXd::Zero(arm.dof());
+    if (settings.initial_u_rad.size() > 0) {
+      u = settings.initial_u_rad;
+    }
+    drive();
+    Eigen::VectorXd x(system->size());
+    system->spread(u, x);
+    integrator->reset(0.0, x, Eigen::VectorXd::Zero(x.size()));
+  }
+
+  /// Passes what the valves will do from now on to the equation of motion.
+  void drive() {
+    if (valves.slewed()) {
+      system->input().follow(integrator->time_s(), valves, map);
+    } else {
+      present_nm.noalias() = map * valves.pressures_bar();
+      target_nm.noalias() = map * valves.commanded_bar();
+      system->drive(integrator->time_s(), present_nm, target_nm, lag_s);
+      if (lag_s == 0.0 && target_nm != driven_nm) {
+        jumped = true;
+        driven_nm = target_nm;
+      }
+    }
+    if (jumped) integrator->input_jumped();
+    jumped = false;
+  }
+
+  /// Lets happen what is due: commands after their dead time, loads that begin or end.
+  void meet_events() {
+    const double now = integrator->time_s();
+    while (!pending.empty() && pending.front().due_s <= now) {
+      valves.command(pending.front().command_bar);
+      pending.pop_front();
+    }
+    jumped |= system->external_loads().enter(now);
+  }
+
+  Eigen::Vector3d displacement_m() const {
+    return system->external_loads().base_displacement_m(integrator->time_s());
+  }
+
+  double next_event_s() const {
+    const double load_s = system->external_loads().until(integrator->time_s());
+    return pending.empty() ? load_s : std::min(load_s, pending.front().due_s);
+  }
+
+  struct PendingCommand {
+    double due_s;
+    std::vector<double> command_bar;
+  };
+
+  ArmParameters arm;
+  double lag_s;
+  double dead_time_s;
+  Valves valves;
+  Eigen::MatrixXd map;
+  std::unique_ptr<PlantSystem> system;
+  std::unique_ptr<Integrator> integrator;
+  Eigen::VectorXd present_nm, target_nm;
+  Eigen::VectorXd driven_nm;  // the torque of the last call without a lag
+  bool jumped = false;        // since the last input_jumped()
+  std::deque<PendingCommand> pending;
+  mutable std::vector<Eigen::Isometry3d> ends;
+};
+
+ArmPlant::ArmPlant(const PlantSettings& settings)
+    : implementation_(std::make_unique<Implementation>(settings)) {}
+ArmPlant::~ArmPlant() = default;
+ArmPlant::ArmPlant(ArmPlant&&) noexcept = default;
+ArmPlant& ArmPlant::operator=(ArmPlant&&) noexcept = default;
+
+int ArmPlant::dof() const noexcept { return implementation_->system->size(); }
+int ArmPlant::segments() const noexcept { return implementation_->arm.size(); }
+int ArmPlant::chambers() const noexcept { return implementation_->valves.size(); }
+
+void ArmPlant::command(std::span<const double> command_bar) {
+  Implementation& self = *implementation_;
+  if (self.dead_time_s > 0.0) {
+    self.pending.push_back(
+        {self.integrator->time_s() + self.dead_time_s, {command_bar.begin(), command_bar.end()}});
+    return;
+  }
+  self.valves.command(command_bar);
+  self.drive();
+}
+
+void ArmPlant::advance(double t_end_s) {
+  Implementation& self = *implementation_;
+  while (t_end_s > self.integrator->time_s()) {
+    const double from_s = self.integrator->time_s();
+    const double to_s = std::min(t_end_s, self.next_event_s());
+    self.integrator->advance(to_s);
+    self.valves.advance(to_s - from_s);
+    self.meet_events();
+    self.drive();
+  }
+}
+
+void ArmPlant::advance(double t_end_s, std::span<const double> command_bar) {
+  command(command_bar);
+  advance(t_end_s);
+}
+
+void ArmPlant::reset(ConstVectorRef u_rad, ConstVectorRef velocity_radps,
+                     std::span<const double> pressure_bar) {
+  Implementation& self = *implementation_;
+  const int dof = self.arm.dof();
+  expect(u_rad.size() == dof && velocity_radps.size() == dof,
+         std::to_string(dof) + " numbers in u and velocity",
+         std::to_string(u_rad.size()) + " and " + std::to_string(velocity_radps.size()));
+  expect(static_cast<int>(pressure_bar.size()) == chambers(),
+         std::to_string(chambers()) + " pressures", std::to_string(pressure_bar.size()));
+  expect(u_rad.allFinite() && velocity_radps.allFinite(), "a finite state", "another");
+  self.pending.clear();
+  self.valves.reset(pressure_bar);
+  self.drive();
+  Eigen::VectorXd x(self.system->size());
+  Eigen::VectorXd v(self.system->size());
+  self.system->spread(u_rad, x);
+  self.system->spread(velocity_radps, v);
+  self.integrator->reset(self.integrator->time_s(), x, v);
+}
+
+double ArmPlant::time_s() const noexcept { return implementation_->integrator->time_s(); }
+Eigen::VectorXd ArmPlant::coordinates() const noexcept { return implementation_->integrator->x(); }
+Eigen::VectorXd ArmPlant::coordinate_rates() const noexcept {
+  return implementation_->integrator->v();
+}
+
+void ArmPlant::curvature(SegmentVector& u_rad, SegmentVector& velocity_radps) const noexcept {
+  const Implementation& self = *implementation_;
+  u_rad.resize(self.arm.dof());
+  velocity_radps.resize(self.arm.dof());
+  self.system->curvature(self.integrator->x(), self.integrator->v(), u_rad, velocity_radps);
+}
+
+SegmentVector ArmPlant::u_rad() const noexcept {
+  SegmentVector u, velocity;
+  curvature(u, velocity);
+  return u;
+}
+
+SegmentVector ArmPlant::velocity_radps() const noexcept {
+  SegmentVector u, velocity;
+  curvature(u, velocity);
+  return velocity;
+}
+
+const Eigen::VectorXd& ArmPlant::pressures_bar() const noexcept {
+  return implementation_->valves.pressures_bar();
+}
+const Eigen::VectorXd& ArmPlant::commanded_bar() const noexcept {
+  return implementation_->valves.commanded_bar();
+}
+
+Eigen::Isometry3d ArmPlant::base() const noexcept {
+  Eigen::Isometry3d base = Eigen::Isometry3d::Identity();
+  base.linear() = implementation_->arm.base_rotation;
+  base.translation() = implementation_->arm.base_position_m + implementation_->displacement_m();
+  return base;
+}
+
+void ArmPlant::segment_ends(std::span<Eigen::Isometry3d> segment_ends) const noexcept {
+  implementation_->system->segment_ends(implementation_->integrator->x(), segment_ends);
+  if (implementation_->system->external_loads().base_moves()) {
+    const Eigen::Vector3d displacement = implementation_->displacement_m();
+    for (Eigen::Isometry3d& end : segment_ends) end.translation() += displacement;
+  }
+}
+
+Eigen::Vector3d ArmPlant::tip_m() const noexcept {
+  segment_ends(implementation_->ends);
+  return implementation_->ends.back().translation();
+}
+
+PlantEnergies ArmPlant::energies() const noexcept {
+  const Implementation& self = *implementation_;
+  return {.kinetic = self.system->kinetic_energy_j(self.integrator->x(), self.integrator->v()),
+          .potential = self.system->potential_energy_j(self.integrator->x()),
+          .supplied = self.integrator->supplied_j(),
+          .dissipated = self.integrator->dissipated_j()};
+}
+
+IntegratorCounters ArmPlant::counters() const noexcept {
+  return implementation_->integrator->counters();
+}
+
+}  // namespace softarm

@@ -1,0 +1,49 @@
+// What acts on an arm beside gravity and valves: loads on the segments' ends, and a base that
+// moves.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "softarm/simulation/settings.hpp"
+
+namespace softarm {
+
+/// External loads and the motion of the base, as functions of time. Loads begin and end at known
+/// instants; the integrator must stop there, so that it can neither step over a short blow nor see
+/// across a step: `until` returns when, `enter` sets what holds from an instant on.
+class ExternalLoads {
+ public:
+  struct Load {
+    int segment;  ///< from 0
+    Eigen::Vector3d force_n, moment_nm;
+    LoadShape shape;
+    double start_s, end_s;
+    bool on;
+  };
+
+  /// @throw std::invalid_argument for loads or a motion that cannot be.
+  explicit ExternalLoads(const PlantSettings& settings);
+
+  bool any_load_on() const { return any_on_; }
+  bool base_moves() const { return base_moves_; }
+  const std::vector<Load>& loads() const { return loads_; }
+  /// The factor on force and moment at t_s.
+  static double scale(const Load& load, double t_s);
+
+  /// The first instant after t_s at which a load begins or ends; infinity if none does.
+  double until(double t_s) const;
+  /// From t_s until the next of these instants. Returns whether a load was switched on or off.
+  bool enter(double t_s);
+
+  Eigen::Vector3d base_displacement_m(double t_s) const;
+  Eigen::Vector3d base_acceleration_mps2(double t_s) const;
+
+ private:
+  std::vector<Load> loads_;
+  bool any_on_ = false;
+  BaseMotion motion_;
+  bool base_moves_;
+};
+
+}  // namespace softarm

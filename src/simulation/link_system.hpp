@@ -1,0 +1,91 @@
+// The arm of the paper's section VI as a second-order system: rigid links joined by two crossed
+// revolute joints, behind valves.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "simulation/plant_system.hpp"
+#include "softarm/simulation/settings.hpp"
+
+namespace softarm {
+
+/// Coordinates x are two angles a link, [a_1, b_1, a_2, b_2, ...]: link j is turned against the
+/// link before by R_x(a_j) R_y(b_j) about its own start. Links are as long, and as heavy, as the
+/// segment divided by their number: slender rods for distributed mass, points at their centres for
+/// point masses. r = B x'' + h(x, x') in O(n) by Newton and Euler's recursion in the links' own
+/// frames.
+///
+/// A chamber's moment follows the body: tau_x and tau_y act on the two axes of every joint of the
+/// segment (the uniform internal moment). The paper's couple has fixed axes, x and y of the
+/// segment's start, and acts on the segment's last link and, reversed, on the one before its first.
+class LinkSystem final : public PlantSystem {
+ public:
+  /// @throw std::invalid_argument for a number of links, a stiffness or a damping that cannot be.
+  explicit LinkSystem(const PlantSettings& settings);
+
+  int size() const override { return 2 * static_cast<int>(links_.size()); }
+  void residual(double t_s, ConstVector x, ConstVector v, ConstVector a, Vector out) override;
+  bool acceleration(double t_s, ConstVector x, ConstVector v, Vector a) override;
+  /// B is exact. Left out of the other two are velocity products and what turns with the inertia
+  /// forces: joint damping and stiffness outweigh them.
+  void linearize(double t_s, ConstVector x, ConstVector v, ConstVector a, Matrix by_a, Matrix by_v,
+                 Matrix by_x) override;
+  Powers powers(double t_s, ConstVector x, ConstVector v) override;
+
+  double kinetic_energy_j(ConstVector x, ConstVector v) override;
+  double potential_energy_j(ConstVector x) override;
+  void spread(ConstVector u, Vector x) const override;
+  void segment_ends(ConstVector x, std::span<Eigen::Isometry3d> ends) const override;
+  void curvature(ConstVector x, ConstVector v, Vector u, Vector rate) const override;
+
+ private:
+  struct Link {
+    double length_m;
+    double mass_kg;
+    double inertia_kgm2;  // about either axis across the link, through its centre
+    double payload_kg;    // at its end
+    double stiffness_nm_per_rad, damping_nms_per_rad;
+  };
+  /// Sine and cosine of a joint's angles.
+  struct Turn {
+    double sa, ca, sb, cb;
+  };
+  using Vec3 = Eigen::Vector3d;
+
+  static Turn turn(double a, double b);
+  static Vec3 into(const Turn& turn, const Vec3& v);    // from the link before into the link
+  static Vec3 out_of(const Turn& turn, const Vec3& v);  // and back
+
+  void place(ConstVector x);
+  /// Acceleration of the base in its own axes.
+  Vec3 base_acceleration(double t_s) const;
+  /// Takes the loads that are on from what moves the links, whose turns are known.
+  void subtract_loads(double t_s);
+  std::size_t last_link(int segment) const {
+    return static_cast<std::size_t>((segment + 1) * per_segment_ - 1);
+  }
+  /// out += actuation and external forces, all generalized.
+  void add_input(double t_s, ConstVector x, Vector out);
+  void inertia(Matrix B);
+
+  int per_segment_;
+  ArmParameters arm_;
+  std::vector<Link> links_;
+  Eigen::VectorXd stiffness_, damping_;  // diagonals of K and D
+  Vec3 gravity_;                         // in the base frame, without the base's acceleration
+
+  // Of one evaluation, from base to tip and back.
+  std::vector<Turn> turns_;
+  std::vector<Vec3> force_, moment_;  // that move the link, about its start, in its frame
+  // Of one linearization, in the base frame.
+  std::vector<Eigen::Matrix3d> rotation_;
+  std::vector<Vec3> origin_;
+  Eigen::Matrix<double, 6, Eigen::Dynamic> motion_;    // axis e and o x e of every angle
+  Eigen::Matrix<double, 6, Eigen::Dynamic> momentum_;  // L and p of what it carries, about the base
+  Eigen::Matrix<double, 3, Eigen::Dynamic> swing_, lever_;  // e x g; e x (first moment carried)
+  Eigen::MatrixXd inertia_;
+  Eigen::VectorXd scratch_;
+};
+
+}  // namespace softarm

@@ -1,0 +1,189 @@
+#include "simulation/pcc_system.hpp"
+
+#include <cmath>
+
+#include "softarm/model/actuation_matrix.hpp"
+#include "softarm/model/kinematics.hpp"
+#include "softarm/model/segment.hpp"
+#include "softarm/model/statics.hpp"
+
+namespace softarm {
+
+PccSystem::PccSystem(const PlantSettings& settings)
+    : PlantSystem(settings.arm.size(), settings),
+      segments_(settings.arm.size()),
+      pieces_(settings.kind == PlantKind::refined ? settings.refined.pieces : 1),
+      arm_(pieces_of(settings)),
+      share_(arm_.size()),
+      gravity_mps2_(arm_.gravity_mps2),
+      loads_(arm_, pieces_, settings.payload_kg),
+      workspace_(arm_),
+      piece_ends_(static_cast<std::size_t>(arm_.size())) {
+  const Eigen::Index n = arm_.dof();
+  for (Eigen::VectorXd* vector : {&stiffness_, &damping_, &shifted_, &above_, &below_, &sum_}) {
+    vector->setZero(n);
+  }
+  coriolis_.setZero(n, n);
+  inertia_.setZero(n, n);
+  for (int j = 0; j < arm_.size(); ++j) {
+    const SegmentParameters& piece = arm_.segments[static_cast<std::size_t>(j)];
+    const SegmentParameters& whole = settings.arm.segments[static_cast<std::size_t>(j / pieces_)];
+    stiffness_.segment<2>(2 * j).setConstant(piece.stiffness_nm_per_rad);
+    damping_.segment<2>(2 * j).setConstant(piece.damping_nms_per_rad);
+    // A segment without stiffness bends under no moment in particular: equally, then.
+    share_[j] = pieces_ == 1 ? 1.0
+                : piece.stiffness_nm_per_rad > 0.0
+                    ? whole.stiffness_nm_per_rad / piece.stiffness_nm_per_rad
+                    : 1.0 / pieces_;
+  }
+}
+
+void PccSystem::add_couple(const Eigen::Vector2d& tau_nm, int first_piece, ConstVector u,
+                           Vector out) const {
+  Eigen::Vector3d local(tau_nm.x(), tau_nm.y(), 0.0);  // in the axes of the piece's start
+  for (int j = first_piece; j < first_piece + pieces_; ++j) {
+    const Eigen::Vector2d bend = u.segment<2>(2 * j);
+    out.segment<2>(2 * j) += segment_angular_jacobian(bend).transpose() * local;
+    local = segment_rotation(bend).transpose() * local;
+  }
+}
+
+void PccSystem::feel_base(double t_s) {
+  if (external_loads_.base_moves()) {
+    arm_.gravity_mps2 = gravity_mps2_ - external_loads_.base_acceleration_mps2(t_s);
+  }
+}
+
+void PccSystem::add_input(double t_s, ConstVector u, Vector out) {
+  const bool couple = arm_.actuation == ActuationModel::couple;
+  const Eigen::VectorXd& force = input_.force_nm(t_s);
+  for (int i = 0; i < segments_; ++i) {
+    const int first = i * pieces_;
+    if (!couple) {
+      for (int j = first; j < first + pieces_; ++j) {
+        out.segment<2>(2 * j) += force.segment<2>(2 * i);
+      }
+    } else if (pieces_ == 1) {
+      out.segment<2>(2 * i) +=
+          actuation_matrix(arm_.actuation, u.segment<2>(2 * i)) * input_.tau_nm(t_s, i);
+    } else {
+      add_couple(input_.tau_nm(t_s, i), first, u, out);
+    }
+  }
+  if (external_loads_.any_load_on()) {
+    loads_.add_external(external_loads_, t_s, u, out);
+  }
+}
+
+void PccSystem::residual(double t_s, ConstVector u, ConstVector velocity, ConstVector acceleration,
+                         Vector out) {
+  sum_.setZero();
+  add_input(t_s, u, sum_);
+  feel_base(t_s);
+  inverse_dynamics(arm_, workspace_, u, velocity, velocity, acceleration, {}, out);
+  if (loads_.has_payload()) {
+    loads_.add_payload(u, velocity, acceleration, arm_.gravity_mps2, out);
+  }
+  out += stiffness_.cwiseProduct(u) + damping_.cwiseProduct(velocity) - sum_;
+}
+
+bool PccSystem::acceleration(double t_s, ConstVector u, ConstVector velocity, Vector out) {
+  if (loads_.has_payload()) {
+    above_.setZero();
+    residual(t_s, u, velocity, above_, below_);
+    below_ = -below_;
+    inertia_matrix(arm_, workspace_, u, inertia_);
+    loads_.add_payload(u, velocity, inertia_, coriolis_);
+    return solve_inertia(workspace_, inertia_, below_, out);
+  }
+  sum_.setZero();
+  add_input(t_s, u, sum_);
+  feel_base(t_s);
+  return forward_dynamics(arm_, workspace_, u, velocity, sum_, out);
+}
+
+void PccSystem::linearize(double t_s, ConstVector u, ConstVector velocity, ConstVector acceleration,
+                          Matrix by_acceleration, Matrix by_velocity, Matrix by_u) {
+  dynamics_matrices(arm_, workspace_, u, velocity, by_acceleration, coriolis_, above_);
+  if (loads_.has_payload()) {
+    loads_.add_payload(u, velocity, by_acceleration, coriolis_);
+  }
+  by_velocity = 2.0 * coriolis_;  // C(u, a) b is symmetric in a and b
+  by_velocity.diagonal() += damping_;
+  // Central differences: step^2 and round-off / step balance near the cube root of the round-off.
+  constexpr double kStep = 1e-5;
+  shifted_ = u;
+  for (Eigen::Index j = 0; j < u.size(); ++j) {
+    shifted_[j] = u[j] + kStep;
+    residual(t_s, shifted_, velocity, acceleration, above_);
+    shifted_[j] = u[j] - kStep;
+    residual(t_s, shifted_, velocity, acceleration, below_);
+    shifted_[j] = u[j];
+    by_u.col(j) = (above_ - below_) / (2.0 * kStep);
+  }
+}
+
+SecondOrderSystem::Powers PccSystem::powers(double t_s, ConstVector u, ConstVector velocity) {
+  sum_.setZero();
+  add_input(t_s, u, sum_);
+  if (external_loads_.base_moves()) {
+    // Inertia forces of the base's acceleration, the only weight in this.
+    arm_.gravity_mps2 = -external_loads_.base_acceleration_mps2(t_s);
+    above_.setZero();
+    gravity_moments(arm_, workspace_, u, below_);
+    if (loads_.has_payload()) loads_.add_payload(u, above_, above_, arm_.gravity_mps2, below_);
+    sum_ -= below_;
+  }
+  return {.supplied_w = sum_.dot(velocity),
+          .dissipated_w = velocity.dot(damping_.cwiseProduct(velocity))};
+}
+
+double PccSystem::kinetic_energy_j(ConstVector u, ConstVector velocity) {
+  return kinetic_energy(arm_, workspace_, u, velocity) + loads_.kinetic_energy_j(u, velocity);
+}
+
+double PccSystem::potential_energy_j(ConstVector u) {
+  arm_.gravity_mps2 = gravity_mps2_;
+  return gravity_potential(arm_, u) + loads_.potential_energy_j(u) +
+         0.5 * u.dot(stiffness_.cwiseProduct(u));
+}
+
+void PccSystem::spread(ConstVector u, Vector x) const {
+  for (int j = 0; j < arm_.size(); ++j) {
+    x.segment<2>(2 * j) = share_[j] * u.segment<2>(2 * (j / pieces_));
+  }
+}
+
+void PccSystem::segment_ends(ConstVector x, std::span<Eigen::Isometry3d> ends) const {
+  forward_kinematics(arm_, x, piece_ends_);
+  for (int i = 0; i < segments_; ++i) {
+    ends[static_cast<std::size_t>(i)] =
+        piece_ends_[static_cast<std::size_t>((i + 1) * pieces_ - 1)];
+  }
+}
+
+void PccSystem::curvature(ConstVector x, ConstVector v, Vector u, Vector rate) const {
+  if (pieces_ == 1) {
+    u = x;
+    rate = v;
+    return;
+  }
+  for (int i = 0; i < segments_; ++i) {
+    Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
+    Eigen::Vector3d chord = Eigen::Vector3d::Zero();
+    Eigen::Vector3d angular = Eigen::Vector3d::Zero();
+    for (int j = i * pieces_; j < (i + 1) * pieces_; ++j) {
+      const Eigen::Vector2d bend = x.segment<2>(2 * j);
+      const double length = arm_.segments[static_cast<std::size_t>(j)].length_m;
+      chord += rotation * segment_tip(length, bend);
+      angular += rotation * (segment_angular_jacobian(bend) * v.segment<2>(2 * j));
+      rotation = rotation * segment_rotation(bend);
+    }
+    Eigen::Vector2d bend, bend_rate;
+    fit_segment(rotation, chord, angular, bend, bend_rate);
+    u.segment<2>(2 * i) = bend;
+    rate.segment<2>(2 * i) = bend_rate;
+  }
+}
+
+}  // namespace softarm

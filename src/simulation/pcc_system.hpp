@@ -1,0 +1,61 @@
+// The piecewise constant curvature arm as a second-order system: (16) with what the world does to
+// it, behind valves; one piece a segment or several.
+#pragma once
+
+#include <Eigen/Core>
+
+#include "simulation/pcc_loads.hpp"
+#include "simulation/plant_system.hpp"
+#include "softarm/model/dynamics.hpp"
+#include "softarm/simulation/settings.hpp"
+
+namespace softarm {
+
+/// r = B u'' + C u' + D u' + G + K u - A tau_A(t) - J' f_ext, where u are the curvatures of all
+/// pieces: `PlantKind::pcc` and `PlantKind::refined`. The moment of a segment's chambers follows
+/// the body and acts on each of its pieces alike; the paper's couple has fixed axes, those of the
+/// segment's start, and acts between there and the segment's end.
+class PccSystem final : public PlantSystem {
+ public:
+  /// @throw std::invalid_argument for pieces that cannot be.
+  explicit PccSystem(const PlantSettings& settings);
+
+  int size() const override { return arm_.dof(); }
+  void residual(double t_s, ConstVector u, ConstVector velocity, ConstVector acceleration,
+                Vector out) override;
+  bool acceleration(double t_s, ConstVector u, ConstVector velocity, Vector out) override;
+  void linearize(double t_s, ConstVector u, ConstVector velocity, ConstVector acceleration,
+                 Matrix by_acceleration, Matrix by_velocity, Matrix by_u) override;
+  Powers powers(double t_s, ConstVector u, ConstVector velocity) override;
+
+  double kinetic_energy_j(ConstVector u, ConstVector velocity) override;
+  double potential_energy_j(ConstVector u) override;
+  void spread(ConstVector u, Vector x) const override;
+  void segment_ends(ConstVector x, std::span<Eigen::Isometry3d> ends) const override;
+  void curvature(ConstVector x, ConstVector v, Vector u, Vector rate) const override;
+
+ private:
+  /// A base that accelerates is gravity the other way.
+  void feel_base(double t_s);
+  /// out += A tau_A(t) + J' f_ext.
+  void add_input(double t_s, ConstVector u, Vector out);
+  void add_couple(const Eigen::Vector2d& tau_nm, int first_piece, ConstVector u, Vector out) const;
+
+  int segments_;
+  int pieces_;                    // a segment
+  ArmParameters arm_;             // of pieces
+  Eigen::VectorXd share_;         // of a segment's bend under a uniform moment, one a piece
+  Eigen::Vector3d gravity_mps2_;  // without the base's acceleration
+  PccLoads loads_;
+  DynamicsWorkspace workspace_;
+  Eigen::VectorXd stiffness_, damping_;            // diagonals of K and D
+  Eigen::VectorXd shifted_, above_, below_, sum_;  // scratch
+  Eigen::MatrixXd coriolis_, inertia_;
+  mutable std::vector<Eigen::Isometry3d> piece_ends_;
+};
+
+/// The arm of pieces that `settings` ask for: a segment is `refined.pieces` of them, one for
+/// `PlantKind::pcc`. @throw std::invalid_argument
+ArmParameters pieces_of(const PlantSettings& settings);
+
+}  // namespace softarm

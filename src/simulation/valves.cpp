@@ -1,0 +1,94 @@
+#include "softarm/simulation/valves.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+namespace softarm {
+namespace {
+
+int checked_count(int chambers) {
+  if (chambers < 0) {
+    throw std::invalid_argument("valves: expected a count of chambers >= 0, got " +
+                                std::to_string(chambers));
+  }
+  return chambers;
+}
+
+}  // namespace
+
+Valves::Valves(const ValveSettings& settings, int chambers, bool both_signs)
+    : lag_s_(settings.lag_s),
+      supply_bar_(settings.supply_pressure_bar),
+      lowest_bar_(both_signs ? -settings.supply_pressure_bar : 0.0),
+      slew_bar_per_s_(settings.slew_bar_per_s),
+      resolution_bar_(settings.resolution_bar),
+      pressure_bar_(Eigen::VectorXd::Zero(checked_count(chambers))),
+      command_bar_(Eigen::VectorXd::Zero(chambers)) {
+  const auto expect = [](double value, const char* key, const char* what) {
+    if (!(value >= 0.0) || !std::isfinite(value)) {
+      throw std::invalid_argument(std::string("valves.") + key + ": expected a finite " + what +
+                                  " >= 0, got " + std::to_string(value));
+    }
+  };
+  expect(lag_s_, "lag_s", "time");
+  expect(supply_bar_, "supply_pressure_bar", "pressure");
+  expect(settings.dead_time_s, "dead_time_s", "time");
+  expect(slew_bar_per_s_, "slew_bar_per_s", "rate");
+  expect(resolution_bar_, "resolution_bar", "pressure");
+}
+
+void Valves::command(std::span<const double> command_bar) noexcept {
+  const std::size_t count = std::min(command_bar.size(), static_cast<std::size_t>(size()));
+  for (std::size_t i = 0; i < count; ++i) {
+    double wanted = std::isnan(command_bar[i]) ? 0.0 : command_bar[i];  // the safe side
+    if (resolution_bar_ > 0.0 && std::isfinite(wanted)) {
+      wanted = resolution_bar_ * std::round(wanted / resolution_bar_);
+    }
+    command_bar_[static_cast<Eigen::Index>(i)] = std::clamp(wanted, lowest_bar_, supply_bar_);
+  }
+  if (lag_s_ == 0.0 && !slewed()) {
+    pressure_bar_ = command_bar_;
+  }
+}
+
+void Valves::after(double ahead_s, Eigen::Ref<Eigen::VectorXd> out) const noexcept {
+  for (Eigen::Index i = 0; i < pressure_bar_.size(); ++i) {
+    double gap = command_bar_[i] - pressure_bar_[i];
+    double left_s = ahead_s;
+    if (slewed()) {
+      const double steep = std::abs(gap) - slew_bar_per_s_ * lag_s_;  // to go on a straight line
+      if (steep > 0.0) {
+        const double ramp_s = std::min(steep / slew_bar_per_s_, left_s);
+        gap -= std::copysign(slew_bar_per_s_ * ramp_s, gap);
+        left_s -= ramp_s;
+      }
+    }
+    // A line that ends at the command itself (no lag) ends there exactly.
+    out[i] = command_bar_[i] - (left_s > 0.0 ? gap * remaining(left_s) : gap);
+  }
+}
+
+void Valves::advance(double step_s) noexcept {
+  if (slewed()) {
+    after(step_s, pressure_bar_);
+    return;
+  }
+  if (lag_s_ == 0.0) {
+    return;
+  }
+  // expm1 keeps the update exact for steps far below the lag.
+  pressure_bar_ += -std::expm1(-step_s / lag_s_) * (command_bar_ - pressure_bar_);
+}
+
+void Valves::reset(std::span<const double> pressure_bar) noexcept {
+  command(pressure_bar);
+  pressure_bar_ = command_bar_;
+}
+
+double Valves::remaining(double ahead_s) const noexcept {
+  return lag_s_ == 0.0 ? 0.0 : std::exp(-ahead_s / lag_s_);
+}
+
+}  // namespace softarm

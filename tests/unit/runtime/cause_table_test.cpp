@@ -1,0 +1,282 @@
+// Every row of the table of causes, with time stepped by hand: what it demands, from which modes,
+// and what it takes to be active again.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <functional>
+#include <ostream>
+#include <string>
+#include <vector>
+
+#include "softarm/runtime/safety_monitor.hpp"
+#include "softarm/runtime/settings.hpp"
+
+namespace softarm {
+namespace {
+
+constexpr std::int64_t kMs = 1'000'000;
+constexpr double kPeriod_s = 0.002;
+constexpr int kGoodFrames = 50;
+
+/// A monitor at 500 Hz whose every input is healthy until a test says otherwise.
+class Bench {
+ public:
+  explicit Bench(Arming arming) : monitor(settings(arming), kPeriod_s) {
+    input.deadman_used = true;
+    input.fully_vented = true;
+  }
+
+  Mode tick() {
+    input.now_ns += 2 * kMs + std::exchange(gap_ns, 0);
+    input.good_frames = frames ? 1 : 0;
+    if (frames) input.newest_capture_ns = input.now_ns - 5 * kMs;
+    if (measurements) input.newest_measurement_ns = input.now_ns;
+    if (go) input.newest_go_ns = input.now_ns;
+    const Mode mode = monitor.step(input);
+    input.arm = input.disarm = input.emergency_stop = input.sender_restarted = false;
+    // Pressure is there after a while under control, and gone after a while of venting.
+    ticks_in_mode = mode == last_mode ? ticks_in_mode + 1 : 0;
+    last_mode = mode;
+    if (mode == Mode::active) input.fully_vented = false;
+    if (mode >= Mode::vent && ticks_in_mode > 100) input.fully_vented = true;
+    return mode;
+  }
+  Mode run(int ticks) {
+    for (int k = 0; k < ticks; ++k) tick();
+    return monitor.mode();
+  }
+  void activate() {
+    run(kGoodFrames + 1);
+    if (!monitor.armed()) {
+      input.arm = true;
+      tick();
+    }
+    ASSERT_EQ(monitor.mode(), Mode::active) << name(monitor.reason());
+  }
+
+  SafetyMonitor monitor;
+  SafetyInput input{.now_ns = 1'000'000'000};
+  bool frames = true, measurements = true, go = true;
+  std::int64_t gap_ns = 0;
+
+ private:
+  static SafetySettings settings(Arming arming) {
+    SafetySettings chosen;
+    chosen.arming = arming;
+    chosen.frame_latency_s = 0.005;
+    chosen.valve_readback = true;
+    return chosen;
+  }
+  int ticks_in_mode = 0;
+  Mode last_mode = Mode::init;
+};
+
+struct Row {
+  Reason reason;
+  Mode mode;  ///< that it leads to from ACTIVE
+  Clearance clearance;
+  bool pressurised;  ///< only where there is pressure, or may be
+  int after_ticks;   ///< at the latest
+  std::function<void(Bench&)> cause, remove;
+};
+
+void PrintTo(const Row& row, std::ostream* out) { *out << name(row.reason) << name(row.mode); }
+
+/// Written from what the reaction must be (docs/reference/faults.md), not from the table in the code.
+const std::vector<Row>& rows() {
+  const auto nothing = [](Bench&) {};
+  static const std::vector<Row> kRows{
+      {Reason::shutdown, Mode::vent, Clearance::never, false, 1,
+       [](Bench& b) { b.input.shutdown = true; }, nothing},
+      {Reason::emergency_stop, Mode::fault, Clearance::disarm_then_arm, false, 1,
+       [](Bench& b) { b.input.emergency_stop = true; }, nothing},
+      {Reason::valves_silent, Mode::fault, Clearance::disarm_then_arm, true, 52,
+       [](Bench& b) { b.measurements = false; }, [](Bench& b) { b.measurements = true; }},
+      {Reason::pressure_mismatch, Mode::fault, Clearance::disarm_then_arm, true, 1,
+       [](Bench& b) { b.input.pressure_mismatch = true; },
+       [](Bench& b) { b.input.pressure_mismatch = false; }},
+      {Reason::curvature_mismatch, Mode::fault, Clearance::disarm_then_arm, false, 1,
+       [](Bench& b) { b.input.curvature_mismatch = true; },
+       [](Bench& b) { b.input.curvature_mismatch = false; }},
+      {Reason::disarmed, Mode::vent, Clearance::arm, false, 1,
+       [](Bench& b) { b.input.disarm = true; }, nothing},
+      {Reason::deadman_released, Mode::vent, Clearance::arm, false, 102,
+       [](Bench& b) { b.go = false; }, [](Bench& b) { b.go = true; }},
+      {Reason::time_gap, Mode::vent, Clearance::good_frames, false, 1,
+       [](Bench& b) { b.gap_ns = 150 * kMs; }, nothing},
+      {Reason::command_expired, Mode::vent, Clearance::good_frames, false, 1,
+       [](Bench& b) { b.input.command_expired = true; },
+       [](Bench& b) { b.input.command_expired = false; }},
+      {Reason::sender_restarted, Mode::vent, Clearance::good_frames, false, 1,
+       [](Bench& b) { b.input.sender_restarted = true; }, nothing},
+      {Reason::frames_stale, Mode::vent, Clearance::good_frames, false, 50,
+       [](Bench& b) { b.frames = false; }, [](Bench& b) { b.frames = true; }},
+      {Reason::soft_limit, Mode::vent, Clearance::arm, false, 1,
+       [](Bench& b) { b.input.soft_limit_exceeded = true; },
+       [](Bench& b) { b.input.soft_limit_exceeded = false; }},
+      {Reason::many_overruns, Mode::vent, Clearance::good_frames, false, 1,
+       [](Bench& b) { b.input.consecutive_overruns = 10; },
+       [](Bench& b) { b.input.consecutive_overruns = 0; }},
+      {Reason::frames_late, Mode::hold, Clearance::good_frames, false, 1,
+       [](Bench& b) { b.input.motion_unknown = true; },
+       [](Bench& b) { b.input.motion_unknown = false; }},
+      {Reason::poses_frozen, Mode::hold, Clearance::good_frames, false, 1,
+       [](Bench& b) { b.input.poses_frozen = true; },
+       [](Bench& b) { b.input.poses_frozen = false; }},
+      {Reason::overruns, Mode::hold, Clearance::good_frames, false, 1,
+       [](Bench& b) { b.input.consecutive_overruns = 3; },
+       [](Bench& b) { b.input.consecutive_overruns = 0; }},
+  };
+  return kRows;
+}
+
+class CauseTable : public ::testing::TestWithParam<Row> {};
+
+TEST_P(CauseTable, FromActiveItLeadsThere) {
+  const Row& row = GetParam();
+  for (const Arming arming : {Arming::automatic, Arming::explicit_}) {
+    Bench bench(arming);
+    bench.activate();
+    row.cause(bench);
+    int ticks = 0;
+    do {
+      bench.tick();
+    } while (++ticks < row.after_ticks && bench.monitor.mode() != row.mode);
+    EXPECT_EQ(bench.monitor.mode(), row.mode);
+    EXPECT_EQ(bench.monitor.reason(), row.reason) << name(bench.monitor.reason());
+  }
+}
+
+TEST_P(CauseTable, ItKeepsTheArmFromBecomingActive) {
+  const Row& row = GetParam();
+  Bench bench(Arming::automatic);
+  // Some causes take a while; no frames come meanwhile. Then enough of them, nearly.
+  bench.frames = false;
+  if (row.after_ticks > 1) row.cause(bench);
+  bench.run(row.after_ticks);
+  bench.frames = row.reason != Reason::frames_stale;
+  bench.run(kGoodFrames - 5);
+  ASSERT_EQ(bench.monitor.mode(), Mode::wait_frames);
+  row.cause(bench);
+  const bool lasts = row.reason != Reason::time_gap && row.reason != Reason::sender_restarted &&
+                     row.reason != Reason::disarmed;
+  const bool latches =
+      row.reason == Reason::shutdown || (row.mode == Mode::fault && !row.pressurised);
+  for (int k = 0; k < 400; ++k) {  // longer than what queued up in a stop counts for nothing
+    const Mode mode = bench.tick();
+    if (lasts || k < 5) {
+      ASSERT_NE(mode, Mode::active) << k;
+    }
+    if (!latches) {
+      ASSERT_LE(mode, Mode::active) << "nothing is pressurised: nothing to hold or vent";
+    }
+  }
+  if (latches) {
+    EXPECT_EQ(bench.monitor.mode(), row.mode);
+  }
+  if (!lasts && row.reason != Reason::disarmed) {
+    EXPECT_EQ(bench.monitor.mode(), Mode::active);
+  }
+}
+
+TEST_P(CauseTable, OnlyWhatMustClearItDoes) {
+  const Row& row = GetParam();
+  for (const Arming arming : {Arming::automatic, Arming::explicit_}) {
+    SCOPED_TRACE(arming == Arming::automatic ? "automatic" : "explicit");
+    Bench bench(arming);
+    bench.activate();
+    row.cause(bench);
+    bench.run(row.after_ticks);
+    ASSERT_EQ(bench.monitor.mode(), row.mode);
+    row.remove(bench);
+
+    // Good frames alone.
+    const bool alone = row.clearance == Clearance::good_frames &&
+                       (row.mode == Mode::hold || arming == Arming::automatic);
+    EXPECT_EQ(bench.run(400) == Mode::active, alone);
+    if (alone) continue;
+    EXPECT_FALSE(bench.monitor.armed());
+
+    bench.input.arm = true;
+    const bool by_arm = row.clearance == Clearance::good_frames || row.clearance == Clearance::arm;
+    EXPECT_EQ(bench.run(2) == Mode::active, by_arm);
+    if (by_arm) continue;
+    EXPECT_FALSE(bench.monitor.armed()) << "an arm must not be stored up";
+
+    bench.input.disarm = true;
+    EXPECT_EQ(bench.run(400), row.clearance == Clearance::never ? row.mode : Mode::vent);
+    bench.input.arm = true;
+    EXPECT_EQ(bench.run(2) == Mode::active, row.clearance == Clearance::disarm_then_arm);
+  }
+}
+
+TEST_P(CauseTable, WhatIsLessSevereDoesNotHideIt) {
+  const Row& severe = GetParam();
+  for (const Row& other : rows()) {
+    if (other.mode >= severe.mode || other.reason == Reason::shutdown) continue;
+    // Fewer overruns are no second cause beside many.
+    if (severe.reason == Reason::many_overruns && other.reason == Reason::overruns) continue;
+    Bench bench(Arming::automatic);
+    bench.activate();
+    other.cause(bench);
+    severe.cause(bench);
+    for (int k = 0; k < severe.after_ticks; ++k) {
+      other.cause(bench);
+      bench.tick();
+    }
+    EXPECT_EQ(bench.monitor.mode(), severe.mode) << "beside " << name(other.reason);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Rows, CauseTable, ::testing::ValuesIn(rows()),
+                         [](const auto& each) { return std::string(name(each.param.reason)); });
+
+TEST(CauseTableInCode, SaysWhatIsTestedHereAndNoMore) {
+  for (const CauseRule& rule : cause_table()) {
+    // A second row of a reason is for an arm without pressure, which it only keeps waiting.
+    const auto row = std::find_if(rows().begin(), rows().end(),
+                                  [&](const Row& each) { return each.reason == rule.reason; });
+    ASSERT_NE(row, rows().end()) << name(rule.reason);
+    if (row->pressurised && rule.demands == Mode::vent) continue;
+    EXPECT_EQ(rule.demands, row->mode) << name(rule.reason);
+    EXPECT_EQ(rule.clearance, row->clearance) << name(rule.reason);
+  }
+}
+
+TEST(CauseTableInCode, TheMoreSevereComeFirst) {
+  const auto rules = cause_table();
+  EXPECT_EQ(rules.front().reason, Reason::shutdown);
+  for (std::size_t k = 2; k < rules.size(); ++k)
+    EXPECT_LE(rules[k].demands, rules[k - 1].demands) << name(rules[k].reason);
+}
+
+TEST(CauseTableInCode, AnEmergencyStopIsToldEvenAfterAnotherFault) {
+  Bench bench(Arming::automatic);
+  bench.activate();
+  bench.input.pressure_mismatch = true;
+  ASSERT_EQ(bench.tick(), Mode::fault);
+  bench.input.emergency_stop = true;
+  EXPECT_EQ(bench.tick(), Mode::fault);
+  EXPECT_EQ(bench.monitor.reason(), Reason::emergency_stop);
+  bench.input.disarm = bench.input.emergency_stop = true;
+  EXPECT_EQ(bench.tick(), Mode::fault) << "of two people the one who wants it stopped is right";
+}
+
+TEST(CauseTableInCode, AFaultIsNotAcknowledgedWhileItLasts) {
+  Bench bench(Arming::automatic);
+  bench.activate();
+  bench.input.pressure_mismatch = true;
+  ASSERT_EQ(bench.tick(), Mode::fault);
+  bench.input.disarm = true;
+  EXPECT_EQ(bench.tick(), Mode::fault) << "there is still pressure";
+  bench.run(200);  // vented by now: nothing may have pressure any more, and nobody can tell
+  bench.input.disarm = true;
+  EXPECT_EQ(bench.tick(), Mode::vent);
+  bench.run(100);
+  EXPECT_EQ(bench.monitor.reason(), Reason::pressure_mismatch);
+  bench.input.arm = true;
+  EXPECT_EQ(bench.run(100), Mode::vent) << "not armed while pressures do not follow";
+}
+
+}  // namespace
+}  // namespace softarm

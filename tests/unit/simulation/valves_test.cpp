@@ -1,0 +1,67 @@
+#include "softarm/simulation/valves.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+namespace softarm {
+namespace {
+
+TEST(Valves, FollowAStepAsAFirstOrderLagDoes) {
+  Valves valves({.lag_s = 0.02, .supply_pressure_bar = 2.0}, 2);
+  valves.command(std::array{1.5, 0.4});
+  for (int k = 1; k <= 200; ++k) {
+    valves.advance(0.5e-3);
+    const double t = 0.5e-3 * k;
+    EXPECT_NEAR(valves.pressures_bar()[0], 1.5 * (1.0 - std::exp(-t / 0.02)), 1e-13);
+    EXPECT_NEAR(valves.pressures_bar()[1], 0.4 * (1.0 - std::exp(-t / 0.02)), 1e-13);
+  }
+}
+
+TEST(Valves, StepsOfAnySizeLeadToTheSamePressure) {
+  Valves once({.lag_s = 0.03, .supply_pressure_bar = 2.0}, 1);
+  Valves often = once;
+  once.command(std::array{1.0});
+  often.command(std::array{1.0});
+  once.advance(0.05);
+  for (int k = 0; k < 50000; ++k) often.advance(1e-6);
+  EXPECT_NEAR(once.pressures_bar()[0], often.pressures_bar()[0], 1e-12);
+  // What an integrator looks ahead to is where the valve then is.
+  const double ahead = once.commanded_bar()[0] +
+                       once.remaining(0.01) * (once.pressures_bar()[0] - once.commanded_bar()[0]);
+  once.advance(0.01);
+  EXPECT_NEAR(once.pressures_bar()[0], ahead, 1e-15);
+}
+
+TEST(Valves, WithoutLagTheCommandIsThePressure) {
+  Valves valves({.lag_s = 0.0, .supply_pressure_bar = 2.0}, 1);
+  valves.command(std::array{0.7});
+  EXPECT_EQ(valves.pressures_bar()[0], 0.7);
+  EXPECT_EQ(valves.remaining(1e-9), 0.0);
+}
+
+TEST(Valves, NeverLeaveTheSupply) {
+  Valves valves({.lag_s = 0.01, .supply_pressure_bar = 2.0}, 3);
+  valves.command(std::array{7.0, -3.0, std::numeric_limits<double>::quiet_NaN()});
+  for (int k = 0; k < 100; ++k) {
+    valves.advance(0.01);
+    EXPECT_LE(valves.pressures_bar().maxCoeff(), 2.0);
+    EXPECT_GE(valves.pressures_bar().minCoeff(), 0.0);
+  }
+  EXPECT_NEAR(valves.pressures_bar()[0], 2.0, 1e-12);
+  EXPECT_EQ(valves.pressures_bar()[1], 0.0);
+  EXPECT_EQ(valves.pressures_bar()[2], 0.0);
+}
+
+TEST(Valves, RefuseSettingsThatMeanNothing) {
+  EXPECT_THROW(Valves({.lag_s = -0.1}, 1), std::invalid_argument);
+  EXPECT_THROW(Valves({.lag_s = std::nan("")}, 1), std::invalid_argument);
+  EXPECT_THROW(Valves({.lag_s = 0.0, .supply_pressure_bar = -1.0}, 1), std::invalid_argument);
+  EXPECT_THROW(Valves(ValveSettings{}, -1), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace softarm

@@ -1,0 +1,105 @@
+#include "dev/bench/plant_report.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "softarm/base/json_writer.hpp"
+
+namespace softarm {
+namespace {
+
+std::string number(double value, const char* unit = "") {
+  return std::isfinite(value) ? fmt::format("{:.{}f}{}", value, value < 10.0 ? 1 : 0, unit) : "-";
+}
+
+void write_trial(JsonWriter& json, const TrialReport& report) {
+  json.open_object();
+  json.member("plant", report.plant);
+  json.member("scene", name(report.scene));
+  json.member("method", report.trial.label);
+  json.member("relative_tolerance", report.trial.tolerance);
+  json.member("error_rad", report.error_rad);
+  json.member("real_time_factor", report.factor);
+  json.member("times_plain_cvode", report.rival_ratio);
+  json.member("steps", report.counters.steps);
+  json.member("residuals", report.counters.residual_evaluations);
+  json.member("linearizations", report.counters.linearizations);
+  if (!report.failure.empty()) json.member("failure", report.failure);
+  json.close_object();
+}
+
+}  // namespace
+
+std::string name(Scene scene) {
+  switch (scene) {
+    case Scene::free:
+      return "free";
+    case Scene::smooth:
+      return "smooth";
+    case Scene::held:
+      break;
+  }
+  return "held";
+}
+
+std::string name(IntegratorMethod method) {
+  constexpr const char* kNames[] = {"sdirk2", "cash4", "sdirk4", "erk", "cvode_bdf"};
+  return kNames[static_cast<std::size_t>(method)];
+}
+
+std::string table(const PlantReport& report) {
+  std::string text = fmt::format(
+      "{} · {} · load {}\nreal-time factor: simulated over processor time, median of {} rounds; "
+      "error: largest of any coordinate\n",
+      report.build.processor, report.build.instruction_set, report.build.load, report.rounds);
+  std::string title;
+  for (const TrialReport& one : report.trials) {
+    const std::string here = fmt::format("{}, {}", one.plant, name(one.scene));
+    if (here != title) {
+      title = here;
+      text += fmt::format("\n{:<32}{:>9}{:>12}{:>9}{:>14}{:>9}{:>11}\n", title, "rtol", "error rad",
+                          "factor", "x plain CVODE", "steps", "residuals");
+    }
+    text += fmt::format("  {:<30}{:>9.0e}{:>12}{:>9}{:>14}{:>9}{:>11}\n", one.trial.label,
+                        one.trial.tolerance,
+                        one.failure.empty() ? fmt::format("{:.1e}", one.error_rad) : one.failure,
+                        number(one.factor), number(one.rival_ratio), one.counters.steps,
+                        one.counters.residual_evaluations);
+  }
+  text +=
+      fmt::format("\nrefined against {} pieces a segment, smooth drive\n{:>8}{:>14}{:>12}{:>9}\n",
+                  kManyPieces, "pieces", "tip error mm", "error rad", "factor");
+  for (const PiecesReport& one : report.pieces) {
+    text += fmt::format("{:>8}{:>14.3g}{:>12.1e}{:>9}\n", one.pieces, 1e3 * one.tip_error_m,
+                        one.error_rad, number(one.factor));
+  }
+  return text;
+}
+
+std::string json(const PlantReport& report) {
+  JsonWriter json;
+  json.open_object();
+  write_build(json, report.build);
+  json.member("rounds", report.rounds);
+  json.member("duration_s", report.duration_s);
+  json.key("trials");
+  json.open_array();
+  for (const TrialReport& one : report.trials) write_trial(json, one);
+  json.close_array();
+  json.key("pieces");
+  json.open_array();
+  for (const PiecesReport& one : report.pieces) {
+    json.open_object();
+    json.member("pieces", one.pieces);
+    json.member("tip_error_m", one.tip_error_m);
+    json.member("error_rad", one.error_rad);
+    json.member("real_time_factor", one.factor);
+    json.close_object();
+  }
+  json.close_array();
+  json.close_object();
+  return json.text() + "\n";
+}
+
+}  // namespace softarm

@@ -1,0 +1,102 @@
+// The people and the references of a soak, and what comes over the wire: one LCM handle.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <set>
+#include <softarm_messages/controller_status_t.hpp>
+#include <softarm_messages/curvature_reference_t.hpp>
+#include <softarm_messages/plant_state_t.hpp>
+#include <softarm_messages/pressure_command_t.hpp>
+#include <utility>
+#include <vector>
+
+#include "dev/soak/command_steps.hpp"
+#include "softarm/config/experiment.hpp"
+#include "softarm/control/reference.hpp"
+#include "softarm/runtime/safety_monitor.hpp"
+#include "softarm/transport/lcm_node.hpp"
+#include "softarm/transport/settings.hpp"
+
+namespace softarm {
+
+/// A motion through random poses, at rest in each, that repeats after `poses` of them: every
+/// segment goes straight through theta = 0 on half of its ways, and rests there now and then.
+ReferenceSettings random_reference(int segments, double most_theta_rad, int poses,
+                                   std::uint64_t seed);
+
+/// Belongs to one thread. While it waits it publishes references at 100 Hz, another random motion
+/// from where the arm is whenever the daemon becomes ACTIVE, and the dead-man's go at 25 Hz.
+class SoakArm {
+ public:
+  /// @throws TransportError
+  explicit SoakArm(const Experiment& experiment);
+
+  /// Handles messages and speaks until `reached`, or `patience_s` have passed; says which.
+  bool wait_for(const std::function<bool()>& reached, double patience_s);
+
+  /// An operator's request, softarm_messages::operator_command_t::ARM ...
+  void request(std::int8_t what);
+  /// What the dead man says from now on.
+  enum class DeadMan { go, let_go, silent };
+  void set_dead_man(DeadMan says);
+
+  Mode mode() const { return static_cast<Mode>(status_.mode); }
+  Reason reason() const { return static_cast<Reason>(status_.reason); }
+  const softarm_messages::controller_status_t& status() const { return status_; }
+  /// Statuses in a row, up to the newest, that say ACTIVE.
+  int active_in_row() const { return active_in_row_; }
+  void count_active_anew() { active_in_row_ = 0; }
+  bool plant_vented() const { return plant_.vented != 0; }
+  /// The chamber with the highest commanded pressure, and that pressure.
+  int fullest_chamber() const;
+  double fullest_bar() const;
+
+  /// Every mode and reason since the last `forget`.
+  bool saw(Mode mode, Reason reason) const { return seen_.count({mode, reason}) > 0; }
+  bool left_active() const;
+  void forget() { seen_.clear(); }
+
+  /// Of all daemons there were.
+  std::int64_t ticks() const { return ended_.ticks + status_.tick; }
+  std::int64_t overruns() const { return ended_.overruns + status_.overruns; }
+  std::int64_t commands() const { return commands_; }
+  std::int64_t commands_outside_limits() const { return outside_; }
+  /// How often the daemon's reference of a segment went through theta = 0.
+  std::int64_t straight_poses() const { return straight_poses_; }
+
+ private:
+  void take_status(const ReceivedMessage& packet);
+  void take_command(const ReceivedMessage& packet);
+  void speak(std::int64_t now_ns);
+  void begin_motion();
+  void publish_reference(std::int64_t now_ns);
+
+  LcmSettings lcm_;
+  double lowest_bar_, highest_bar_, largest_step_bar_;
+  ControllerSettings control_;
+  int segments_;
+  std::uint64_t seed_;
+  LcmNode node_;
+  std::optional<Reference> reference_;  ///< since the daemon has been ACTIVE for the first time
+  ReferenceSample sample_;
+  std::vector<std::array<double, 2>> followed_;  ///< u of the daemon's reference, rad
+  std::int64_t next_reference_ns_, next_go_ns_, motion_began_ns_ = 0;
+  std::int64_t sequence_;
+  DeadMan dead_man_ = DeadMan::go;
+  std::set<std::pair<Mode, Reason>> seen_;
+  int active_in_row_ = 0;
+  struct {
+    std::int64_t ticks = 0, overruns = 0;
+  } ended_;  // daemons
+  std::int64_t commands_ = 0, outside_ = 0, straight_poses_ = 0;
+  softarm_messages::controller_status_t status_{}, decoded_{};
+  softarm_messages::plant_state_t plant_{};
+  softarm_messages::pressure_command_t command_{};
+  CommandSteps steps_;
+  softarm_messages::curvature_reference_t reference_message_{};
+};
+
+}  // namespace softarm

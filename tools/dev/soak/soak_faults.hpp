@@ -1,0 +1,45 @@
+// The faults that a soak causes, and what each demands of the daemon.
+#pragma once
+
+#include <cstdint>
+#include <softarm_messages/controller_status_t.hpp>
+#include <span>
+
+#include "softarm/runtime/safety_monitor.hpp"
+
+namespace softarm {
+
+/// Who makes it.
+enum class SoakAction {
+  relay,   ///< the fault injector between sensors and daemon, by `SoakFault::relay_fault`
+  disarm,  ///< an operator
+  emergency_stop,
+  let_go,        ///< the dead-man input says so
+  fall_silent,   ///< the dead-man input says nothing
+  hostile,       ///< bytes that are no message
+  flood,         ///< the same, as fast as they can be sent
+  pause_daemon,  ///< SIGSTOP, for longer than vent_after_s
+  pause_plant,
+  restart_plant,  ///< SIGKILL, and another one
+  end_daemon,     ///< SIGTERM, and another one
+  kill_daemon     ///< SIGKILL, and another one
+};
+
+/// Demanded is a mode with its reason, or, where nothing may happen to the arm, that a counter of
+/// the status goes on; of a daemon that ends, that the arm is vented.
+struct SoakFault {
+  const char* name;
+  SoakAction action;
+  const char* relay_fault = "";
+  double amount = 0.0;  ///< of the relay's fault; 0: as usual
+  Mode mode = Mode::active;
+  Reason reason = Reason::none;
+  std::int32_t softarm_messages::controller_status_t::*counter = nullptr;
+  int counts = 0;  ///< how far the counter must go on
+
+  /// A process is replaced, so that nothing can be said of its memory over the whole run.
+  bool replaces_process() const { return action >= SoakAction::restart_plant; }
+};
+std::span<const SoakFault> soak_faults();
+
+}  // namespace softarm

@@ -1,0 +1,315 @@
+#include "dev/soak/soak_run.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <fstream>
+#include <numeric>
+#include <softarm_messages/operator_command_t.hpp>
+
+#include "apps/program.hpp"
+#include "apps/progress.hpp"
+#include "apps/signals.hpp"
+#include "softarm/base/clock.hpp"
+#include "softarm/base/time.hpp"
+#include "softarm/config/load.hpp"
+#include "softarm/transport/settings.hpp"
+
+namespace softarm {
+namespace {
+
+using namespace std::chrono_literals;
+using Request = softarm_messages::operator_command_t;
+
+constexpr double kPatience_s = 15.0;
+constexpr int kSteadyStatuses = 50;  ///< ACTIVE in a row: recovered
+constexpr double kBurstFrom_bar = 0.5;
+
+}  // namespace
+
+std::filesystem::path write_soak_config(const SoakOptions& options) {
+  const std::filesystem::path path = options.folder / "soak.yaml";
+  std::ofstream(path) << fmt::format(
+      "include: {}\nname: soak\nseed: {}\n"
+      "reference: [{{kind: live, timeout_s: 1}}]\n"
+      "daemon:\n"
+      "  rate_hz: 500\n"
+      "  lcm: {{url: \"udpm://239.255.76.67:{}?ttl=0\", deadman_channel: SOFTARM_SOAK_GO}}\n"
+      "  safety: {{arming: explicit, frame_period_s: 0.002, hold_after_s: 0.1, vent_after_s: "
+      "0.25,\n"
+      "    valve_readback: true, valve_silence_s: 0.4, deadman_timeout_s: 1.5}}\n"
+      "plant: {{mocap: {{rate_hz: 500}}}}\n",
+      std::filesystem::absolute(options.config).string(), options.seed, 20000 + getpid() % 40000);
+  return path;
+}
+
+SoakRun::SoakRun(const SoakOptions& options)
+    : options_(options),
+      config_(write_soak_config(options)),
+      experiment_(load_experiment(config_)),
+      random_(options.seed),
+      arm_(experiment_),
+      relay_(experiment_.transport.lcm, kSensorSuffix),
+      sender_(experiment_.transport.lcm.url),
+      daemon_{.name = "softarmd", .arguments = {config_.string()}, .process = {}, .record = {}},
+      plant_{.name = "softarm-plant",
+             .arguments = {config_.string(), "--sensor-suffix", kSensorSuffix},
+             .process = {},
+             .record = {}},
+      replace_until_s_(std::min(0.25 * options.duration_s, 300.0)),
+      warm_up_s_(replace_until_s_ + std::min(0.125 * options.duration_s, 60.0)) {
+  if (experiment_.actuation.kind == ActuationKind::torque)
+    throw ConfigError(options.config, 0, "actuation.kind",
+                      "chambers: a soak watches pressures and valves", "torque");
+  if (experiment_.transport.mocap.source != MocapSourceKind::softarm)
+    throw ConfigError(options.config, 0, "daemon.mocap.source",
+                      "softarm, the only frames that a soak can spoil", "another source");
+  for (const SoakFault& fault : soak_faults()) counters_.faults.push_back({.name = fault.name});
+}
+
+double SoakRun::passed_s() const { return to_seconds(monotonic_now_ns() - start_ns_); }
+
+void SoakRun::start(Program& program) {
+  const int number = program.process ? ++program.record.instances : 1;
+  program.process = std::make_unique<ChildProcess>(
+      program_beside_this(program.name), program.arguments,
+      (options_.folder / fmt::format("{}_{}.txt", program.name, number)).string());
+  program.record.name = program.name;
+}
+
+void SoakRun::end(Program& program) {
+  program.process->signal(SIGTERM);
+  if (const int code = program.process->wait(5s); code != 0)
+    counters_.troubles.push_back(
+        code < 0 ? fmt::format("{} did not end in 5 s after SIGTERM", program.name)
+                 : fmt::format("{} ended with exit code {} after SIGTERM", program.name, code));
+}
+
+/// A process that ended by itself ends the soak.
+void SoakRun::look_after_processes() {
+  for (Program* program : {&daemon_, &plant_}) {
+    const int code = program->process->wait(0ms);
+    if (code < 0) continue;
+    counters_.troubles.push_back(fmt::format("{} ended by itself after {:.1f} s, exit code {}",
+                                             program->name, passed_s(), code));
+    stop_ = true;
+  }
+}
+
+void SoakRun::measure_after_warm_up(double now_s) {
+  for (Program* program : {&daemon_, &plant_}) {
+    ProcessRecord& record = program->record;
+    const auto use = process_use(program->process->pid());
+    if (!use) continue;
+    if (!record.measured && now_s >= warm_up_s_) {
+      record.after_warm_up = *use;
+      record.measured = true;
+    }
+    record.at_end = *use;
+  }
+}
+
+/// What an operator would do: acknowledge a fault, then arm.
+bool SoakRun::operate_until_active(double patience_s) {
+  arm_.count_active_anew();
+  const double end_s = passed_s() + patience_s;
+  const auto active = [&] { return arm_.active_in_row() >= kSteadyStatuses; };
+  while (passed_s() < end_s && stop_requested == 0 && !stop_) {
+    if (arm_.wait_for(active, 0.2)) return true;
+    look_after_processes();
+    if (arm_.mode() == Mode::fault) {
+      arm_.request(Request::DISARM);
+    } else if (arm_.reason() == Reason::waiting_for_arm) {
+      arm_.request(Request::ARM);
+    }
+  }
+  return active();
+}
+
+void SoakRun::wait_between_faults() {
+  arm_.forget();
+  const double pause_s = options_.between_s * std::uniform_real_distribution(0.5, 1.5)(random_);
+  arm_.wait_for([] { return stop_requested != 0; }, pause_s);
+  if (!arm_.left_active()) return;
+  ++counters_.unprovoked;
+  operate_until_active(kPatience_s);
+}
+
+/// All faults in random order, then all again, those that replace a process first, and only at the
+/// beginning of the run.
+const SoakFault& SoakRun::next_fault(double now_s) {
+  const std::span<const SoakFault> faults = soak_faults();
+  while (true) {
+    if (cycle_.empty()) {
+      cycle_.resize(faults.size());
+      std::iota(cycle_.begin(), cycle_.end(), std::size_t{0});
+      std::shuffle(cycle_.begin(), cycle_.end(), random_);
+      std::stable_partition(cycle_.begin(), cycle_.end(),
+                            [&](std::size_t k) { return !faults[k].replaces_process(); });
+    }
+    const SoakFault& fault = faults[cycle_.back()];
+    cycle_.pop_back();
+    if (!fault.replaces_process() || now_s < replace_until_s_) return fault;
+  }
+}
+
+void SoakRun::send_hostile_bytes() {
+  const std::vector<Packet> packets = hostile_packets(experiment_.transport.lcm);
+  for (int round = 0; round < 10; ++round) {
+    for (const Packet& packet : packets) sender_.send(packet);
+    arm_.wait_for([] { return false; }, 0.02);  // the real frames come through
+  }
+}
+
+void SoakRun::flood() {
+  const Packet garbage =
+      lcm_packet(experiment_.transport.lcm.mocap_channel, Packet(100, std::byte{7}));
+  for (const double end_s = passed_s() + 0.3; passed_s() < end_s;) {
+    for (int k = 0; k < 100; ++k) sender_.send(garbage);
+    arm_.wait_for([] { return true; }, 0.0);
+  }
+}
+
+void SoakRun::cause(const SoakFault& fault) {
+  const double beyond_vent_s = 2.0 * experiment_.safety.vent_after_s;
+  switch (fault.action) {
+    case SoakAction::relay: {
+      Fault chosen = *find_fault(fault.relay_fault);
+      if (fault.amount > 0.0) chosen.amount = fault.amount;
+      const int segments = experiment_.arm.dof() / 2;
+      chosen.body = std::uniform_int_distribution(1, segments)(random_);
+      if (chosen.kind == FaultKind::burst) {
+        arm_.wait_for([&] { return arm_.fullest_bar() > kBurstFrom_bar; }, kPatience_s);
+        chosen.body = arm_.fullest_chamber();
+      }
+      return relay_.set(chosen);
+    }
+    case SoakAction::disarm:
+      return arm_.request(Request::DISARM);
+    case SoakAction::emergency_stop:
+      return arm_.request(Request::EMERGENCY_STOP);
+    case SoakAction::let_go:
+      return arm_.set_dead_man(SoakArm::DeadMan::let_go);
+    case SoakAction::fall_silent:
+      return arm_.set_dead_man(SoakArm::DeadMan::silent);
+    case SoakAction::hostile:
+      return send_hostile_bytes();
+    case SoakAction::flood:
+      return flood();
+    case SoakAction::pause_daemon: {
+      const std::int64_t before = arm_.overruns();
+      const std::int64_t tick = arm_.ticks();
+      daemon_.process->stop();
+      arm_.wait_for([] { return false; }, beyond_vent_s);
+      daemon_.process->signal(SIGCONT);
+      arm_.wait_for([&] { return arm_.ticks() > tick + 2; }, kPatience_s);
+      counters_.overruns_while_stopped += arm_.overruns() - before;
+      return;
+    }
+    case SoakAction::pause_plant:
+      return plant_.process->stop();
+    case SoakAction::restart_plant:
+      plant_.process->signal(SIGKILL);
+      plant_.process->wait(5s);
+      return;
+    case SoakAction::end_daemon:
+      return end(daemon_);
+    case SoakAction::kill_daemon:
+      daemon_.process->signal(SIGKILL);
+      daemon_.process->wait(5s);
+      return;
+  }
+}
+
+bool SoakRun::answered(const SoakFault& fault, int counter_before) {
+  if (fault.counter != nullptr)
+    return arm_.wait_for(
+        [&] { return arm_.status().*fault.counter >= counter_before + fault.counts; }, kPatience_s);
+  if (fault.mode == Mode::active)  // a daemon that is no more
+    return arm_.wait_for([&] { return arm_.plant_vented(); }, kPatience_s);
+  return arm_.wait_for([&] { return arm_.saw(fault.mode, fault.reason); }, kPatience_s);
+}
+
+void SoakRun::clear(const SoakFault& fault) {
+  relay_.set({});
+  arm_.set_dead_man(SoakArm::DeadMan::go);
+  if (fault.action == SoakAction::pause_plant) plant_.process->signal(SIGCONT);
+  if (fault.action == SoakAction::restart_plant) start(plant_);
+  if (fault.action == SoakAction::end_daemon || fault.action == SoakAction::kill_daemon)
+    start(daemon_);
+}
+
+void SoakRun::make(const SoakFault& fault, FaultCount& count) {
+  ++count.injected;
+  arm_.forget();
+  const int before = fault.counter != nullptr ? arm_.status().*fault.counter : 0;
+  const double begin_s = passed_s();
+  cause(fault);
+  const bool seen = answered(fault, before);
+  count.answered += seen ? 1 : 0;
+  const double answer_s = passed_s();
+  count.longest_answer_s = std::max(count.longest_answer_s, answer_s - begin_s);
+  if (fault.counter != nullptr && arm_.left_active()) ++count.disturbed;
+  clear(fault);
+  const bool recovered = operate_until_active(kPatience_s);
+  count.recovered += recovered ? 1 : 0;
+  count.longest_recovery_s = std::max(count.longest_recovery_s, passed_s() - answer_s);
+  if (!seen || !recovered)
+    counters_.troubles.push_back(fmt::format("{} at {:.1f} s: {}; then {} ({})", fault.name,
+                                             begin_s, seen ? "not recovered" : "not answered",
+                                             name(arm_.mode()), name(arm_.reason())));
+}
+
+void SoakRun::soak() {
+  Progress progress(true);
+  while (passed_s() < options_.duration_s) {
+    wait_between_faults();
+    look_after_processes();
+    if (stop_ || stop_requested != 0) return;
+    const SoakFault& fault = next_fault(passed_s());
+    const auto index = static_cast<std::size_t>(&fault - soak_faults().data());
+    make(fault, counters_.faults[index]);
+    look_after_processes();
+    measure_after_warm_up(passed_s());
+    if (progress.due())
+      progress.update(
+          fmt::format("softarm-dev soak: {:.0f} / {:.0f} s: {} ticks, {} missed; {} faults, {} "
+                      "recovered; softarmd "
+                      "{} KiB, softarm-plant {} KiB",
+                      passed_s(), options_.duration_s, arm_.ticks(), arm_.overruns(),
+                      counters_.injected(), counters_.recovered(),
+                      daemon_.record.at_end.resident_kib, plant_.record.at_end.resident_kib));
+  }
+}
+
+SoakCounters SoakRun::run() {
+  start_ns_ = monotonic_now_ns();
+  start(plant_);
+  start(daemon_);
+  if (operate_until_active(kPatience_s)) {
+    for (Program* program : {&daemon_, &plant_})
+      program->record.at_start = process_use(program->process->pid()).value_or(ProcessUse{});
+    soak();
+  } else if (!stop_) {
+    counters_.troubles.push_back(
+        fmt::format("not ACTIVE within {:g} s, but {} ({})\n{}{}", kPatience_s, name(arm_.mode()),
+                    name(arm_.reason()), daemon_.process->printed(), plant_.process->printed()));
+  }
+  if (!stop_) {
+    end(daemon_);
+    arm_.wait_for([] { return false; }, 0.1);  // its last messages
+    end(plant_);
+  }
+  counters_.duration_s = passed_s();
+  counters_.warm_up_s = warm_up_s_;
+  counters_.rate_hz = experiment_.rate_hz;
+  counters_.ticks = arm_.ticks();
+  counters_.overruns = arm_.overruns();
+  counters_.commands = arm_.commands();
+  counters_.commands_outside_limits = arm_.commands_outside_limits();
+  counters_.straight_poses = arm_.straight_poses();
+  for (const Program* program : {&daemon_, &plant_}) counters_.processes.push_back(program->record);
+  return counters_;
+}
+
+}  // namespace softarm

@@ -1,0 +1,79 @@
+// A daemon and a simulated arm as processes, random faults one after the other, and what became of
+// them.
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "dev/child_process.hpp"
+#include "dev/fault/fault_relay.hpp"
+#include "dev/fault/raw_packets.hpp"
+#include "dev/soak/soak_arm.hpp"
+#include "dev/soak/soak_faults.hpp"
+#include "dev/soak/soak_report.hpp"
+
+namespace softarm {
+
+struct SoakOptions {
+  std::string config;  ///< the experiment whose arm and controller are meant
+  double duration_s = 60.0;
+  double between_s = 1.0;  ///< mean of the random time between two faults
+  std::uint64_t seed = 1;
+  std::filesystem::path folder;  ///< for the configuration and what the processes print
+};
+
+/// Writes the soak's own configuration into the folder and returns its path: the experiment with
+/// tick and motion capture at 500 Hz, live references, explicit arming, read-back, a dead-man
+/// input, thresholds that a busy machine does not reach by itself, and a port of its own.
+std::filesystem::path write_soak_config(const SoakOptions& options);
+
+class SoakRun {
+ public:
+  /// @throws ConfigError, TransportError
+  explicit SoakRun(const SoakOptions& options);
+
+  /// Returns after the duration, or when a stop is requested, with both processes ended.
+  SoakCounters run();
+
+ private:
+  struct Program {
+    std::string name;
+    std::vector<std::string> arguments;
+    std::unique_ptr<ChildProcess> process;
+    ProcessRecord record;
+  };
+  void start(Program& program);
+  void end(Program& program);
+  void soak();
+  void look_after_processes();
+  void measure_after_warm_up(double passed_s);
+  bool operate_until_active(double patience_s);
+  void wait_between_faults();
+  const SoakFault& next_fault(double passed_s);
+  void cause(const SoakFault& fault);
+  bool answered(const SoakFault& fault, int counter_before);
+  void clear(const SoakFault& fault);
+  void make(const SoakFault& fault, FaultCount& count);
+  void send_hostile_bytes();
+  void flood();
+  double passed_s() const;
+
+  SoakOptions options_;
+  std::filesystem::path config_;
+  Experiment experiment_;
+  std::mt19937_64 random_;
+  SoakArm arm_;
+  FaultRelay relay_;
+  RawSender sender_;
+  Program daemon_, plant_;
+  std::vector<std::size_t> cycle_;  ///< faults still to come before all have been there once more
+  std::int64_t start_ns_ = 0;
+  double replace_until_s_, warm_up_s_;
+  bool stop_ = false;
+  SoakCounters counters_;
+};
+
+}  // namespace softarm
