@@ -1,5 +1,5 @@
-// The loop against the simulated arm: a frame comes in, a pressure goes out. usage: example_loop
-// CONFIG
+// The loop against the simulated arm: a frame comes in, a pressure goes out.
+// usage: example_loop CONFIG
 #include <iostream>
 #include <softarm/config/load.hpp>
 #include <softarm/runtime/control_pipeline.hpp>
