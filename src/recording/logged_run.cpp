@@ -5,13 +5,11 @@
 #include <stdexcept>
 
 #include "softarm/base/clock.hpp"
+#include "softarm/base/time.hpp"
 #include "softarm/runtime/log_row.hpp"
 #include "softarm/simulation/lock_step.hpp"
 
 namespace softarm {
-namespace {
-constexpr std::int64_t kLatestTime_us = 4'000'000'000'000'000;  // nanoseconds must not overflow
-}  // namespace
 
 LoggedRun::LoggedRun(const Experiment& experiment, const std::filesystem::path& log)
     : experiment_(experiment),
@@ -33,7 +31,7 @@ bool LoggedRun::read_frame() {
   for (LogEvent event; log_.next(event);) {
     const auto channel = mocap_.find(event.channel);
     if (!channel) continue;
-    if (event.time_us < 0 || event.time_us >= kLatestTime_us) {
+    if (event.time_us < 0 || !is_time_us(event.time_us)) {
       ++malformed_;
       continue;
     }
