@@ -10,9 +10,6 @@
 #include "softarm/simulation/lock_step.hpp"
 
 namespace softarm {
-namespace {
-constexpr std::int64_t kLatestTime_us = 4'000'000'000'000'000;  // nanoseconds must not overflow
-}  // namespace
 
 LoggedRun::LoggedRun(const Experiment& experiment, const std::filesystem::path& log)
     : experiment_(experiment),
@@ -34,7 +31,7 @@ bool LoggedRun::read_frame() {
   for (LogEvent event; log_.next(event);) {
     const auto channel = mocap_.find(event.channel);
     if (!channel) continue;
-    if (event.time_us < 0 || event.time_us >= kLatestTime_us) {
+    if (event.time_us < 0 || !is_time_us(event.time_us)) {
       ++malformed_;
       continue;
     }
