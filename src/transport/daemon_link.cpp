@@ -1,10 +1,9 @@
 #include "softarm/transport/daemon_link.hpp"
 
-#include <time.h>
-
 #include <algorithm>
 #include <cmath>
 
+#include "softarm/actuation/command_expiry.hpp"
 #include "softarm/runtime/settings.hpp"
 #include "softarm/transport/message_decoding.hpp"
 #include "softarm/transport/settings.hpp"
@@ -18,12 +17,6 @@ constexpr int kOtherCapacity = 16;
 constexpr auto kNever = std::numeric_limits<std::int64_t>::min();
 /// After so long a silence a sender of references or requests may begin its numbers anew.
 constexpr std::int64_t kNumberForgotten_ns = 500'000'000;
-
-std::int64_t wall_clock_ns() noexcept {
-  timespec now{};
-  clock_gettime(CLOCK_REALTIME, &now);
-  return std::int64_t{now.tv_sec} * 1'000'000'000 + now.tv_nsec;
-}
 
 }  // namespace
 
@@ -65,9 +58,7 @@ DaemonLink::DaemonLink(const PipelineSettings& settings, const TransportSettings
 }
 
 TickInput DaemonLink::collect(std::int64_t now_ns) noexcept {
-  previous_collect_ns_ = now_ns_;
-  now_ns_ = now_ns;
-  wall_minus_monotonic_ns_ = wall_clock_ns() - now_ns;
+  arrivals_.begin_round(now_ns);
   frame_count_ = 0;
   input_ = {};
   input_.now_ns = now_ns;
@@ -81,17 +72,10 @@ TickInput DaemonLink::collect(std::int64_t now_ns) noexcept {
   return input_;
 }
 
-/// LCM stamps arrivals with the wall clock. Brought to ours they can only lie between the last
-/// collection and now: so a wall clock that is set meanwhile does no harm.
-std::int64_t DaemonLink::arrival_ns(const ReceivedMessage& packet) const noexcept {
-  const std::int64_t arrival = packet.arrival_utime_us * 1000 - wall_minus_monotonic_ns_;
-  return std::clamp(arrival, previous_collect_ns_, now_ns_);
-}
-
 void DaemonLink::take_frame(std::size_t channel, const ReceivedMessage& packet) noexcept {
   if (frame_count_ == frames_.size()) return;
-  const MocapReceipt receipt =
-      mocap_.take(channel, packet.bytes, arrival_ns(packet), frames_[frame_count_]);
+  const MocapReceipt receipt = mocap_.take(
+      channel, packet.bytes, arrivals_.arrival_ns(packet.arrival_utime_us), frames_[frame_count_]);
   if (receipt == MocapReceipt::malformed) ++malformed_;
   if (receipt == MocapReceipt::frame) ++frame_count_;
 }
@@ -101,10 +85,10 @@ void DaemonLink::take_reference(const ReceivedMessage& packet) noexcept {
     ++malformed_;
     return;
   }
-  const bool forgotten = now_ns_ - newest_reference_ns_ > kNumberForgotten_ns;
+  const bool forgotten = arrivals_.now_ns() - newest_reference_ns_ > kNumberForgotten_ns;
   if (reference_message_.sequence <= reference_sequence_ && !forgotten) return;
   reference_sequence_ = reference_message_.sequence;
-  newest_reference_ns_ = now_ns_;
+  newest_reference_ns_ = arrivals_.now_ns();
   const auto vector = [this](const std::vector<double>& from) {
     return SegmentVector(Eigen::Map<const Eigen::VectorXd>(from.data(), dof_));
   };
@@ -119,16 +103,16 @@ void DaemonLink::take_operator(const ReceivedMessage& packet) noexcept {
     return;
   }
   const bool newer = operator_message_.sequence > operator_sequence_ ||
-                     now_ns_ - newest_operator_ns_ > kNumberForgotten_ns;
+                     arrivals_.now_ns() - newest_operator_ns_ > kNumberForgotten_ns;
   if (newer) operator_sequence_ = operator_message_.sequence;
-  newest_operator_ns_ = now_ns_;
+  newest_operator_ns_ = arrivals_.now_ns();
   // Whoever wants the arm vented is right, whatever the number; so is a request nobody knows.
   using Request = softarm_messages::operator_command_t;
   const bool arm = operator_message_.request == Request::ARM;
   const bool emergency = operator_message_.request == Request::EMERGENCY_STOP;
-  input_.emergency_stop |= emergency;
-  input_.disarm |= !arm && !emergency;
-  input_.arm |= arm && newer;
+  input_.requests.emergency_stop |= emergency;
+  input_.requests.disarm |= !arm && !emergency;
+  input_.requests.arm |= arm && newer;
 }
 
 void DaemonLink::take_measurement(const ReceivedMessage& packet) noexcept {
@@ -139,7 +123,7 @@ void DaemonLink::take_measurement(const ReceivedMessage& packet) noexcept {
     ++malformed_;
     return;
   }
-  newest_measurement_ns_ = arrival_ns(packet);
+  newest_measurement_ns_ = arrivals_.arrival_ns(packet.arrival_utime_us);
   std::copy(measured.begin(), measured.end(), measured_bar_.begin());
   // What the valves measure answers to whoever commands them: not to a shadow.
   if (messages_.pressure_command.shadow == 0) input_.measured_bar = &measured_bar_;
@@ -153,7 +137,7 @@ void DaemonLink::take_go(const ReceivedMessage& packet) noexcept {
   if (deadman_message_.go == 0) newest_go_ns_ = kNever;
   if (deadman_message_.go == 0 || deadman_message_.sequence == go_sequence_) return;
   go_sequence_ = deadman_message_.sequence;
-  newest_go_ns_ = arrival_ns(packet);
+  newest_go_ns_ = arrivals_.arrival_ns(packet.arrival_utime_us);
 }
 
 void DaemonLink::publish_command(std::int64_t now_ns, const TickOutput& output) noexcept {
@@ -172,7 +156,7 @@ void DaemonLink::publish_command(std::int64_t now_ns, const TickOutput& output) 
 }
 
 bool DaemonLink::command_expired(std::int64_t now_us) const noexcept {
-  return now_us - sent_us_ >= messages_.pressure_command.validity_us;
+  return has_expired(sent_us_, messages_.pressure_command.validity_us, now_us);
 }
 
 void DaemonLink::publish_status(std::int64_t now_ns, const ControlPipeline& pipeline,

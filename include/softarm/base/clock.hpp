@@ -1,4 +1,4 @@
-// The machine's monotonic clock, and deadlines on it.
+// The machine's clocks, and deadlines on the monotonic one.
 #pragma once
 
 #include <cstdint>
@@ -7,6 +7,10 @@ namespace softarm {
 
 /// CLOCK_MONOTONIC in ns.
 std::int64_t monotonic_now_ns() noexcept;
+
+/// CLOCK_REALTIME in ns since 1970: the only clock that two machines, and two boots of one, share.
+/// It may be set at any time, also back.
+std::int64_t wall_now_ns() noexcept;
 
 /// Sleeps until an absolute time of CLOCK_MONOTONIC; returns early when a signal arrives.
 void sleep_until_ns(std::int64_t deadline_ns) noexcept;

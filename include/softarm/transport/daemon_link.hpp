@@ -13,6 +13,7 @@
 #include "softarm/base/histogram.hpp"
 #include "softarm/runtime/control_pipeline.hpp"
 #include "softarm/runtime/settings.hpp"
+#include "softarm/transport/arrival_clock.hpp"
 #include "softarm/transport/lcm_node.hpp"
 #include "softarm/transport/mocap_source.hpp"
 #include "softarm/transport/output_messages.hpp"
@@ -66,7 +67,6 @@ class DaemonLink {
   void take_operator(const ReceivedMessage& packet) noexcept;
   void take_measurement(const ReceivedMessage& packet) noexcept;
   void take_go(const ReceivedMessage& packet) noexcept;
-  std::int64_t arrival_ns(const ReceivedMessage& packet) const noexcept;
   bool command_expired(std::int64_t now_us) const noexcept;
 
   LcmSettings lcm_;
@@ -81,9 +81,7 @@ class DaemonLink {
   std::size_t frame_count_ = 0;
   LiveReferenceInput reference_;
   TickInput input_;
-  std::int64_t now_ns_ = 0;
-  std::int64_t wall_minus_monotonic_ns_ = 0;
-  std::int64_t previous_collect_ns_ = 0;
+  ArrivalClock arrivals_;
   std::int64_t newest_measurement_ns_;
   std::int64_t newest_go_ns_;
   std::int64_t go_sequence_;

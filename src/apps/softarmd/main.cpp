@@ -149,7 +149,7 @@ class DaemonLoop {
 
   void tick(std::int64_t woken_ns) noexcept {
     TickInput input = link_.collect(woken_ns);
-    input.shutdown = stop_requested != 0;
+    input.requests.shutdown = stop_requested != 0;
     input.consecutive_overruns = judge_overruns_ ? missed_in_row_ : 0;
     const TickOutput& output = pipeline_.tick(input);
     const std::int64_t decided_ns = monotonic_now_ns();
