@@ -7,7 +7,6 @@
 #include <numbers>
 
 #include "commissioning/preflight/statics.hpp"
-#include "softarm/client/commander.hpp"
 
 namespace softarm {
 namespace {
