@@ -115,8 +115,7 @@ std::vector<std::string> experiment_warnings(const Experiment& experiment) {
       resolve_thresholds(experiment.safety, 1.0 / experiment.rate_hz);
   const double unanswered_s =
       (experiment.valves.tolerated_failures + 1) / experiment.valves.rate_hz;
-  if (experiment.safety.valve_readback &&
-      unanswered_s >= experiment.safety.valve_silence_s) {
+  if (experiment.safety.valve_readback && unanswered_s >= experiment.safety.valve_silence_s) {
     warnings.push_back(fmt::format(
         "valves.tolerated_failures: so many failures last {:.3g} s, daemon.safety.valve_silence_s "
         "is {:.3g} s: the daemon goes to FAULT before softarm-valves has tolerated them",

@@ -55,13 +55,35 @@ void TrackingSummary::add_tip(const LogRow& row) {
   if (!row.tip || !row.tip_reference) return;
   const double error = (*row.tip - *row.tip_reference).norm(), since = row.t_s - active_since_s_;
   if (since >= tracking_from_s_) {
-    tip_squared_.emplace_back(row.t_s, error * error);
+    tip_.add(row.t_s, error);
     tip_max_m_ = std::isnan(tip_max_m_) ? error : std::max(tip_max_m_, error);
   }
   if (!row.tip_is_asked) return;
   tip_is_asked_ = true;
   if (error >= kTipNear_m || since < tip_last_s_) tip_last_far_s_ = since;
   tip_last_s_ = since;
+}
+
+void TrackingSummary::TipErrors::add(double t_s, double error_m) {
+  if (stretches_.empty() || stretches_.back().errors.count >= rows_a_stretch_) {
+    if (stretches_.size() == kMostStretches) {
+      for (std::size_t k = 0; k < kMostStretches / 2; ++k) {
+        stretches_[k] = stretches_[2 * k];
+        stretches_[k].errors.add(stretches_[2 * k + 1].errors);
+      }
+      stretches_.resize(kMostStretches / 2);
+      rows_a_stretch_ *= 2;
+    }
+    stretches_.push_back({t_s, {}});
+  }
+  stretches_.back().errors.add(error_m);
+}
+
+TrackingSummary::MeanSquare TrackingSummary::TipErrors::since(double t_s) const {
+  MeanSquare all;
+  for (const Stretch& stretch : stretches_)
+    if (stretch.begin_s >= t_s) all.add(stretch.errors);
+  return all;
 }
 
 void TrackingSummary::add_tracking(const LogRow& row) {
@@ -126,22 +148,14 @@ void TrackingSummary::write_tracking(JsonWriter& json) const {
     json.close_array();
   };
   const double half_s = 0.5 * (first_t_s_ + last_t_s_);
-  MeanSquare tip, tip_second_half;
-  for (const auto& [t_s, squared] : tip_squared_) {
-    tip.sum += squared;
-    ++tip.count;
-    if (t_s < half_s) continue;
-    tip_second_half.sum += squared;
-    ++tip_second_half.count;
-  }
   json.open_object();
   json.member("u_rms_rad", u_.rms());
   json.member("u_max_rad", u_max_rad_);
   list("u_rms_segment_rad", u_of_segment_);
   list("theta_rms_rad", theta_);
   list("phi_rms_rad", phi_);
-  json.member("tip_rms_m", tip.rms());
-  json.member("tip_rms_second_half_m", tip_second_half.rms());
+  json.member("tip_rms_m", tip_.since(-std::numeric_limits<double>::infinity()).rms());
+  json.member("tip_rms_second_half_m", tip_.since(half_s).rms());
   if (tip_is_asked_) {
     json.member("tip_max_m", tip_max_m_);
     json.member("tip_near_after_s", tip_last_far_s_ < tip_last_s_
@@ -163,11 +177,6 @@ void TrackingSummary::write_frames(JsonWriter& json) const {
 }
 
 std::string TrackingSummary::tip_line() const {
-  MeanSquare tip;
-  for (const auto& [t_s, squared] : tip_squared_) {
-    tip.sum += squared;
-    ++tip.count;
-  }
   const std::string arrived =
       tip_last_far_s_ < tip_last_s_
           ? fmt::format("within {:.0f} mm for good {:.2f} s after ACTIVE", 1e3 * kTipNear_m,
@@ -175,7 +184,8 @@ std::string TrackingSummary::tip_line() const {
           : fmt::format("not within {:.0f} mm at the end", 1e3 * kTipNear_m);
   return fmt::format(
       "tip error {:.3f} mm rms, {:.3f} mm at most, from {:g} s after ACTIVE on; {}\n",
-      1e3 * tip.rms(), 1e3 * tip_max_m_, tracking_from_s_, arrived);
+      1e3 * tip_.since(-std::numeric_limits<double>::infinity()).rms(), 1e3 * tip_max_m_,
+      tracking_from_s_, arrived);
 }
 
 std::string TrackingSummary::table() const {

@@ -1,4 +1,4 @@
-// Reading LCM's event logs (lcm-logger, softarm import), damaged ones too.
+// LCM's event logs (lcm-logger): reading them, damaged ones too, and writing them.
 //
 //   std::ifstream file(path, std::ios::binary);
 //   EventLogReader log(file);
@@ -7,6 +7,8 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
+#include <fstream>
 #include <istream>
 #include <span>
 #include <string>
@@ -72,6 +74,28 @@ class EventLogReader {
   std::vector<LogDamage> damages_;
   std::int64_t damage_count_ = 0;
   std::int64_t damaged_bytes_ = 0;
+};
+
+/// Writes a log that lcm-logplayer and EventLogReader read. Events are numbered from 0.
+class EventLogWriter {
+ public:
+  /// What was there before is overwritten. @throws std::runtime_error if it cannot be opened
+  explicit EventLogWriter(const std::filesystem::path& file);
+
+  /// @param time_us  arrival, wall clock, as the logs of lcm-logger have it
+  /// @param channel  1 to EventLogReader::kLargestChannel bytes  @param data  up to kLargestData
+  /// @throws std::invalid_argument for others; std::runtime_error if the file could not be written
+  void write(std::int64_t time_us, std::string_view channel, std::span<const std::byte> data);
+
+  /// Everything is in the file after this, or it throws std::runtime_error. Writes nothing further.
+  void close();
+
+ private:
+  void check();
+
+  std::filesystem::path path_;
+  std::ofstream file_;
+  std::int64_t number_ = 0;
 };
 
 }  // namespace softarm

@@ -37,7 +37,7 @@ int report(const ReportOptions& options) {
   StatusRecord record(experiment, options.out);
   Progress progress;
   for (LogEvent event; log.next(event);) {
-    if (record.take(event.channel, event.data)) record.write_rows(false);
+    record.take(event.channel, event.data);
     if (progress.due()) {
       progress.update(fmt::format("{:3.0f} % of {}, {:.0f} s",
                                   100.0 * static_cast<double>(log.position()) / size, options.log,
@@ -52,12 +52,11 @@ int report(const ReportOptions& options) {
                                        experiment.transport.lcm.status_channel));
     return kExitData;
   }
-  if (static_cast<std::uint64_t>(record.status().configuration_hash) != experiment.hash) {
+  if (record.status().configuration_hash != experiment.hash) {
     say(fmt::format(
         "softarm: warning: the log was made with configuration {:016x}, {} is {:016x}: what the "
         "report takes from the configuration may not be what was in force\n",
-        static_cast<std::uint64_t>(record.status().configuration_hash), options.config,
-        experiment.hash));
+        record.status().configuration_hash, options.config, experiment.hash));
   }
   fmt::print("{}log, summary and timing are in {}\n", record.table(), options.out);
   if (options.plots) draw_plots(options.out);

@@ -98,9 +98,9 @@ inline RecordedRun record_run(const Experiment& experiment, double seconds, bool
     input.now_ns = now_ns;
     input.frames = frames;
     if (k % 50 == 0) input.reference = &reference;
-    input.disarm = k == ticks * 8 / 10;
-    input.arm = k % 40 == 0;
-    input.shutdown = part > 0.95;
+    input.requests.disarm = k == ticks * 8 / 10;
+    input.requests.arm = k % 40 == 0;
+    input.requests.shutdown = part > 0.95;
     input.command_expired = k == ticks * 6 / 10;
     input.consecutive_overruns = k % 17 == 0 ? 1 : 0;
     const TickOutput& output = pipeline.tick(input);

@@ -190,18 +190,19 @@ TEST_F(DaemonLinkOverUdp, ADisarmIsObeyedWhateverItsNumber) {
                     operator_command_t{.sequence = sequence, .request = what});
   };
   request(1000, operator_command_t::ARM);
-  ASSERT_TRUE(collect_until([](const TickInput& input) { return input.arm; }));
+  ASSERT_TRUE(collect_until([](const TickInput& input) { return input.requests.arm; }));
   // Another person's machine, on which less time has passed.
   request(10, operator_command_t::ARM);
   request(11, operator_command_t::DISARM);
   ASSERT_TRUE(collect_until([](const TickInput& input) {
-    EXPECT_FALSE(input.arm) << "an older ARM is ignored";
-    return input.disarm;
+    EXPECT_FALSE(input.requests.arm) << "an older ARM is ignored";
+    return input.requests.disarm;
   }));
   request(1000, operator_command_t::ARM);
   request(2000, operator_command_t::ARM);
   int armed = 0;
-  ASSERT_TRUE(collect_until([&](const TickInput& input) { return (armed += input.arm) > 0; }));
+  ASSERT_TRUE(
+      collect_until([&](const TickInput& input) { return (armed += input.requests.arm) > 0; }));
 }
 
 TEST_F(DaemonLinkOverUdp, AnEmergencyStopIsObeyedWhateverItsNumberAndIsNoDisarm) {
@@ -210,14 +211,14 @@ TEST_F(DaemonLinkOverUdp, AnEmergencyStopIsObeyedWhateverItsNumberAndIsNoDisarm)
                     operator_command_t{.sequence = sequence, .request = what});
   };
   request(1000, operator_command_t::ARM);
-  ASSERT_TRUE(collect_until([](const TickInput& input) { return input.arm; }));
+  ASSERT_TRUE(collect_until([](const TickInput& input) { return input.requests.arm; }));
   request(10, operator_command_t::EMERGENCY_STOP);
   ASSERT_TRUE(collect_until([](const TickInput& input) {
-    EXPECT_FALSE(input.disarm) << "a disarm would acknowledge the stop";
-    return input.emergency_stop;
+    EXPECT_FALSE(input.requests.disarm) << "a disarm would acknowledge the stop";
+    return input.requests.emergency_stop;
   }));
   request(11, 77);  // nobody knows what that is
-  ASSERT_TRUE(collect_until([](const TickInput& input) { return input.disarm; }));
+  ASSERT_TRUE(collect_until([](const TickInput& input) { return input.requests.disarm; }));
 }
 
 TEST_F(DaemonLinkOverUdp, AGoIsHeardOnceANumberAndTakenBackAtOnce) {
