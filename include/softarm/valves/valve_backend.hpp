@@ -52,6 +52,7 @@ class ValveBackend {
   virtual void close() noexcept = 0;
   virtual bool is_open() const noexcept = 0;
 
+  /// What `secure` achieved.
   struct Secured {
     LinkResult result;
     bool confirmed;  ///< the time-out reads back as it was set
