@@ -70,7 +70,7 @@ void describe_stuck_valves(SchemaVisitor& visitor, ValveDriverSettings& valves) 
 }  // namespace
 
 void describe_valves(SchemaVisitor& visitor, ValveDriverSettings& valves, int chambers) {
-  visitor.text({"backend", "", "who drives the valves: modbus, or one of a program of your own",
+  visitor.text({"backend", "", "what drives the valves: modbus, or the back end of another program",
                 from_to(1, 63)},
                valves.backend);
   visitor.text({"device", "", "what a back end opens that is not on a network", from_to(0, 255)},
