@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <string>
+#include <utility>
 
 #include "softarm/client/arm_client.hpp"
 
@@ -19,8 +20,8 @@ namespace softarm {
 class GuardedMotion {
  public:
   /// @param client  holds the lock on the command channel
-  GuardedMotion(ArmClient& client, std::int64_t lost_ns, const std::function<bool()>& stop)
-      : client_(client), lost_ns_(lost_ns), stop_(stop) {}
+  GuardedMotion(ArmClient& client, std::int64_t lost_ns, std::function<bool()> stop)
+      : client_(client), lost_ns_(lost_ns), stop_(std::move(stop)) {}
 
   /// Commands `bar`, at `rate_bar_per_s` at most, until `done()`; it is asked once a round, after
   /// messages were handled. Returns at once where the motion is at an end.
@@ -33,7 +34,7 @@ class GuardedMotion {
 
   ArmClient& client_;
   std::int64_t lost_ns_;
-  const std::function<bool()>& stop_;
+  std::function<bool()> stop_;
   std::string aborted_;
 };
 

@@ -45,8 +45,8 @@ struct MeasuredPressures {
 /// the order base, segment ends 1 .. n. Chambers count segment by segment from the base. Threads,
 /// callbacks and clock as OperatorClient says.
 ///
-/// Only listening and operator requests are for use beside a softarmd that commands the arm, or
-/// references where its phase is `live`. Who commands chambers is instead of it: one at a time.
+/// Beside a softarmd that commands the arm: listening, requests and, in a phase that is `live`,
+/// references. Commanding chambers replaces softarmd; the lock admits one of the two.
 class ArmClient : public OperatorClient {
  public:
   /// @throws TransportError
@@ -95,7 +95,7 @@ class ArmClient : public OperatorClient {
   // Commands to the chambers, in place of softarmd.
 
   /// Takes the lock that softarmd holds on the command channel of this machine, until the client is
-  /// destroyed. What commands from elsewhere `other_commander` shows after listening for a while.
+  /// destroyed. Who commands from another machine shows in `other_commander`: listen for a while.
   /// @throws OtherInstance; std::logic_error where actuation is by torque, or it is taken already
   void lock_commands();
   /// Moves every set point towards `wanted_bar` (one a chamber, bar), within the limits of pressure

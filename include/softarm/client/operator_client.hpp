@@ -44,15 +44,16 @@ struct ArmMessage {
   std::int64_t wall_us;     ///< the same on the wall clock
 };
 
-/// Belongs to one thread: nothing is handled, and no callback called, but in `update`, the
-/// functions that wait, and `request`. A callback may throw; what it throws leaves that function.
-/// Each kind of callback has one place: setting another one replaces it. Times are ns of
-/// CLOCK_MONOTONIC unless a clock was given.
+/// Belongs to one thread. Messages are handled, and callbacks called, only in `update`, `wait_for`,
+/// `wait_for_status` and `request`. A callback may throw; what it throws leaves that function. Each
+/// kind of callback has one place: setting another one replaces it. Times are ns of CLOCK_MONOTONIC
+/// unless a clock was given.
 class OperatorClient {
  public:
   using Clock = std::function<std::int64_t()>;
 
-  /// @param clock  what counts as now, in ns, not decreasing; tests give their own
+  /// @param clock  what counts as now, in ns, not decreasing: for tests. What waits for a time of
+  /// this clock (`update`, `vent_to_rest`) needs it to go on.
   /// @throws TransportError
   explicit OperatorClient(const LcmSettings& lcm, Clock clock = monotonic_now_ns)
       : OperatorClient(lcm, 0, std::move(clock)) {}
@@ -62,9 +63,8 @@ class OperatorClient {
 
   std::int64_t now_ns() const { return clock_(); }
 
-  /// Waits for messages until `until_ns` and handles those that are there. Returns whether there
-  /// were any: at once after the first, so that a loop can look at what it said; false also where a
-  /// signal cut the wait short. @throws what callbacks throw
+  /// Waits for a message until `until_ns`, handles it and all others that are there, and returns:
+  /// false where none came, or a signal cut the wait short. @throws what callbacks throw
   bool update(std::int64_t until_ns);
   /// Handles messages, one by one, until `reached()`, which is asked after each, or for
   /// `patience_s` of the real clock; returns whether it was reached.

@@ -20,6 +20,10 @@ class Commanding : public test::ClientTest {
     ClientTest::SetUp();
     if (!IsSkipped()) sent = peer_hears<pressure_command_t>(lcm.command_channel);
   }
+  void TearDown() override {
+    step_ns = kMs;  // where it has to vent, that takes a second of its clock
+    client.reset();
+  }
   /// The valves hear so many commands.
   bool arrive(std::size_t count) {
     return wait_for([&] { return sent->size() >= count; });

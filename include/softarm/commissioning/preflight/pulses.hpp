@@ -8,6 +8,7 @@
 
 namespace softarm {
 
+/// What is played on every chamber in turn.
 struct PulsePlan {
   double pressure_bar = 0.0;  ///< above actuation.min_pressure_bar; 0: soft_pressure_bar
   double hold_s = 0.6;        ///< two thirds to settle, one third to measure
