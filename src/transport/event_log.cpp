@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <stdexcept>
 #include <utility>
 
 namespace softarm {
@@ -20,6 +21,13 @@ std::uint64_t number_at(const std::byte* bytes, std::size_t size) {
 }
 
 }  // namespace
+
+EventLogReader::EventLogReader(const std::filesystem::path& path)
+    : file_(path, std::ios::binary), stream_(file_) {
+  if (!file_ || std::filesystem::is_directory(path))
+    throw std::runtime_error("cannot read " + path.string() +
+                             ": is it an LCM log (softarm import, lcm-logger)?");
+}
 
 /// Reads on until `wanted` bytes lie behind the cursor, or the log ends; returns how many do.
 std::size_t EventLogReader::available(std::size_t wanted) {

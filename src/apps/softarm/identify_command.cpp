@@ -27,6 +27,7 @@ namespace {
 
 struct Command {
   std::string config, output, log, out;
+  std::string damage;  ///< of the log
   LoggedInput input = LoggedInput::commanded;
   FitChoice choice;
   StepPlan plan;
@@ -54,10 +55,12 @@ MotionRecord play(const Experiment& experiment, const Command& command) {
   return outcome.record;
 }
 
-MotionRecord record_of(const Experiment& experiment, const Command& command) {
+MotionRecord record_of(const Experiment& experiment, Command& command) {
   if (command.live) return play(experiment, command);
   if (command.log.empty()) return record_step_response(experiment, command.plan);
-  MotionRecord record = read_log(experiment, command.log, command.input);
+  const LoggedMotion logged = read_log(experiment, command.log, command.input);
+  command.damage = logged.damage;
+  MotionRecord record = logged.record;
   const double end_s = record.time_s[record.time_s.size() - 1] + 1e-6;
   const double to_s = command.to_s > 0.0 ? std::min(command.to_s, end_s) : end_s;
   record = record.part(command.from_s, to_s, 0.0);
@@ -266,7 +269,12 @@ void add_identify_command(CLI::App& app) {
     options->has_hold = hold->count() > 0;
     options->coverage = seeds->count() > 0;
     options->study.window_s = options->options.window_s;
-    if (const int code = identify(*options); code != kExitOk) throw CLI::RuntimeError(code);
+    int code = identify(*options);
+    if (!options->damage.empty()) {
+      print_error("softarm", options->log + ": " + options->damage);
+      if (code == kExitOk) code = kExitData;
+    }
+    if (code != kExitOk) throw CLI::RuntimeError(code);
   });
 }
 
