@@ -3,9 +3,8 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <nlohmann/json.hpp>
 #include <numbers>
-
-#include "softarm/base/json_writer.hpp"
 
 namespace softarm {
 namespace {
@@ -106,74 +105,66 @@ void TrackingSummary::add_tracking(const LogRow& row) {
   }
 }
 
+struct TrackingSummary::Json {
+  using Value = nlohmann::ordered_json;
+
+  static Value rms_of(const std::vector<MeanSquare>& values) {
+    Value list = Value::array();
+    for (const MeanSquare& each : values) list.push_back(each.rms());
+    return list;
+  }
+
+  static Value tracking(const TrackingSummary& of) {
+    const double half_s = 0.5 * (of.first_t_s_ + of.last_t_s_);
+    Value json{{"u_rms_rad", of.u_.rms()},
+               {"u_max_rad", of.u_max_rad_},
+               {"u_rms_segment_rad", rms_of(of.u_of_segment_)},
+               {"theta_rms_rad", rms_of(of.theta_)},
+               {"phi_rms_rad", rms_of(of.phi_)},
+               {"tip_rms_m", of.tip_.since(-std::numeric_limits<double>::infinity()).rms()},
+               {"tip_rms_second_half_m", of.tip_.since(half_s).rms()}};
+    if (of.tip_is_asked_) {
+      json["tip_max_m"] = of.tip_max_m_;
+      json["tip_near_after_s"] = of.tip_last_far_s_ < of.tip_last_s_
+                                     ? of.tip_last_far_s_
+                                     : std::numeric_limits<double>::quiet_NaN();
+    }
+    return json;
+  }
+
+  static Value modes(const TrackingSummary& of) {
+    Value json = Value::object();
+    for (std::size_t k = 0; k < of.mode_s_.size(); ++k)
+      if (of.mode_s_[k] > 0.0) json[name(static_cast<Mode>(k))] = of.mode_s_[k];
+    return json;
+  }
+
+  static Value transitions(const TrackingSummary& of) {
+    Value list = Value::array();
+    for (const Transition& each : of.transitions_)
+      list.push_back({{"t_s", each.t_s}, {"mode", name(each.mode)}, {"reason", name(each.reason)}});
+    return list;
+  }
+};
+
 std::string TrackingSummary::json() const {
-  JsonWriter json;
-  json.open_object();
-  json.member("duration_s", duration_s());
-  json.member("ticks", ticks_);
-  json.key("tracking");
-  write_tracking(json);
-  json.key(torques_ ? "torque_nm" : "pressure_bar");
-  json.open_object();
-  json.member("max", command_max_);
-  json.close_object();
-  json.member("saturated_fraction", active_ticks_ > 0 ? static_cast<double>(saturated_ticks_) /
-                                                            static_cast<double>(active_ticks_)
-                                                      : 0.0);
-  json.key("modes");
-  json.open_object();
-  for (std::size_t k = 0; k < mode_s_.size(); ++k)
-    if (mode_s_[k] > 0.0) json.member(name(static_cast<Mode>(k)), mode_s_[k]);
-  json.close_object();
-  json.key("transitions");
-  json.open_array();
-  for (const Transition& transition : transitions_) {
-    json.open_object();
-    json.member("t_s", transition.t_s);
-    json.member("mode", name(transition.mode));
-    json.member("reason", name(transition.reason));
-    json.close_object();
-  }
-  json.close_array();
-  if (frames_) write_frames(json);
-  json.close_object();
-  return json.text() + "\n";
-}
-
-void TrackingSummary::write_tracking(JsonWriter& json) const {
-  const auto list = [&json](const char* key, const std::vector<MeanSquare>& values) {
-    json.key(key);
-    json.open_array();
-    for (const MeanSquare& each : values) json.value(each.rms());
-    json.close_array();
-  };
-  const double half_s = 0.5 * (first_t_s_ + last_t_s_);
-  json.open_object();
-  json.member("u_rms_rad", u_.rms());
-  json.member("u_max_rad", u_max_rad_);
-  list("u_rms_segment_rad", u_of_segment_);
-  list("theta_rms_rad", theta_);
-  list("phi_rms_rad", phi_);
-  json.member("tip_rms_m", tip_.since(-std::numeric_limits<double>::infinity()).rms());
-  json.member("tip_rms_second_half_m", tip_.since(half_s).rms());
-  if (tip_is_asked_) {
-    json.member("tip_max_m", tip_max_m_);
-    json.member("tip_near_after_s", tip_last_far_s_ < tip_last_s_
-                                        ? tip_last_far_s_
-                                        : std::numeric_limits<double>::quiet_NaN());
-  }
-  json.close_object();
-}
-
-void TrackingSummary::write_frames(JsonWriter& json) const {
-  json.key("frames");
-  json.open_object();
-  json.member("accepted", frames_->accepted);
-  json.member("rejected", frames_->rejected());
-  json.member("repeated", frames_->repeated);
-  json.member("missing", frames_->missing);
-  json.member("late", late_frames_);
-  json.close_object();
+  const double saturated =
+      active_ticks_ > 0 ? static_cast<double>(saturated_ticks_) / static_cast<double>(active_ticks_)
+                        : 0.0;
+  Json::Value json{{"duration_s", duration_s()},
+                   {"ticks", ticks_},
+                   {"tracking", Json::tracking(*this)},
+                   {torques_ ? "torque_nm" : "pressure_bar", {{"max", command_max_}}},
+                   {"saturated_fraction", saturated},
+                   {"modes", Json::modes(*this)},
+                   {"transitions", Json::transitions(*this)}};
+  if (frames_)
+    json["frames"] = {{"accepted", frames_->accepted},
+                      {"rejected", frames_->rejected()},
+                      {"repeated", frames_->repeated},
+                      {"missing", frames_->missing},
+                      {"late", late_frames_}};
+  return json.dump() + "\n";
 }
 
 std::string TrackingSummary::tip_line() const {

@@ -26,6 +26,13 @@ void put_number(std::uint64_t value, std::size_t size, std::byte*& to) {
 
 }  // namespace
 
+EventLogReader::EventLogReader(const std::filesystem::path& path)
+    : file_(path, std::ios::binary), stream_(file_) {
+  if (!file_ || std::filesystem::is_directory(path))
+    throw std::runtime_error("cannot read " + path.string() +
+                             ": is it an LCM log (softarm import, lcm-logger)?");
+}
+
 /// Reads on until `wanted` bytes lie behind the cursor, or the log ends; returns how many do.
 std::size_t EventLogReader::available(std::size_t wanted) {
   while (buffer_.size() - at_ < wanted && stream_.good()) {

@@ -13,8 +13,6 @@
 
 namespace softarm {
 
-class JsonWriter;
-
 /// How well a reference was tracked, accumulated tick by tick: reference minus the plant's true u,
 /// from `tracking_from_s` after each ACTIVE on. Where the reference is a path of the tip, also when
 /// the tip came near it.
@@ -84,11 +82,10 @@ class TrackingSummary {
     std::vector<Stretch> stretches_;
     std::int64_t rows_a_stretch_ = 1;
   };
+  struct Json;  ///< makes the parts of json()
   void add_tracking(const LogRow& row);
   void add_tip(const LogRow& row);
   std::string tip_line() const;
-  void write_tracking(JsonWriter& json) const;
-  void write_frames(JsonWriter& json) const;
 
   int segments_;
   double tracking_from_s_;

@@ -1,7 +1,6 @@
 // LCM's event logs (lcm-logger): reading them, damaged ones too, and writing them.
 //
-//   std::ifstream file(path, std::ios::binary);
-//   EventLogReader log(file);
+//   EventLogReader log(path);
 //   for (LogEvent event; log.next(event);) use(event.channel, event.data);
 #pragma once
 
@@ -10,10 +9,13 @@
 #include <filesystem>
 #include <fstream>
 #include <istream>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
 #include <vector>
+
+#include "softarm/base/time.hpp"
 
 namespace softarm {
 
@@ -21,9 +23,15 @@ namespace softarm {
 struct LogEvent {
   std::int64_t position = 0;  ///< of its first byte in the log
   std::int64_t number = 0;    ///< as the logger counted
-  std::int64_t time_us = 0;   ///< arrival at the logger, its wall clock
+  std::int64_t time_us = 0;   ///< arrival at the logger, its wall clock; any number if damaged
   std::string_view channel;
   std::span<const std::byte> data;
+
+  /// The same in ns; nothing where it is no time whose nanoseconds can be added and subtracted.
+  std::optional<std::int64_t> arrival_ns() const noexcept {
+    if (time_us < 0 || !is_time_us(time_us)) return std::nullopt;
+    return 1000 * time_us;
+  }
 };
 
 /// Bytes [begin, end) of a log that belong to no event.
@@ -42,6 +50,8 @@ class EventLogReader {
   static constexpr std::size_t kLargestData = 4 << 20;  ///< larger ones count as damage
   static constexpr std::size_t kDamagesKept = 16;
 
+  /// @throws std::runtime_error where the file cannot be read
+  explicit EventLogReader(const std::filesystem::path& path);
   /// The stream must outlive the reader.
   explicit EventLogReader(std::istream& stream) : stream_(stream) {}
 
@@ -65,6 +75,7 @@ class EventLogReader {
   void skip_to_sync();
   void add_damage(std::int64_t begin, std::int64_t end);
 
+  std::ifstream file_;
   std::istream& stream_;
   std::vector<std::byte> buffer_;
   std::size_t at_ = 0;         ///< of the buffer: what precedes it has been read

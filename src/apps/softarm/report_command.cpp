@@ -3,9 +3,7 @@
 #include <fmt/format.h>
 
 #include <filesystem>
-#include <fstream>
 #include <memory>
-#include <stdexcept>
 
 #include "apps/program.hpp"
 #include "apps/progress.hpp"
@@ -27,13 +25,8 @@ struct ReportOptions {
 
 int report(const ReportOptions& options) {
   const Experiment experiment = load_experiment(options.config);
-  std::ifstream file(options.log, std::ios::binary);
-  if (!file) {
-    throw std::runtime_error(
-        fmt::format("cannot read {}: is it an LCM log (lcm-logger)?", options.log));
-  }
+  EventLogReader log(std::filesystem::path(options.log));
   const auto size = static_cast<double>(std::filesystem::file_size(options.log));
-  EventLogReader log(file);
   StatusRecord record(experiment, options.out);
   Progress progress;
   for (LogEvent event; log.next(event);) {
