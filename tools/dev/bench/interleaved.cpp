@@ -1,14 +1,10 @@
 #include "dev/bench/interleaved.hpp"
 
-#include <time.h>
-
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <limits>
 
 #include "softarm/base/clock.hpp"
-#include "softarm/base/time.hpp"
 
 namespace softarm {
 namespace {
@@ -21,16 +17,9 @@ constexpr std::size_t kMinimumRounds = 3;
 }  // namespace
 
 BenchClocks machine_clocks() {
-  return {.wall_ns =
-              [] {
-                const auto now = std::chrono::steady_clock::now().time_since_epoch();
-                return std::chrono::duration<double, std::nano>(now).count();
-              },
-          .processor_ns = [] {  // of this thread: what others do on the same core does not count
-            timespec time{};
-            clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
-            return 1e9 * static_cast<double>(time.tv_sec) + static_cast<double>(time.tv_nsec);
-          }};
+  return {.wall_ns = [] { return static_cast<double>(monotonic_now_ns()); },
+          // Of this thread: what others do on the same core does not count.
+          .processor_ns = [] { return static_cast<double>(thread_cpu_ns()); }};
 }
 
 double quantile(std::vector<double> values, double share) {
