@@ -56,8 +56,11 @@ TEST(TruthTrack, IsExactForACubicBetweenTwoReportsAndEmptyElsewhere) {
   LogRow row;
   truth.fill(kStart_us, row);
   EXPECT_EQ(row.truth.size(), 0);
-  truth.add(plant_at(kStart_us));
-  truth.add(plant_at(kStart_us + 500'000));
+  for (const std::int64_t time_us : {kStart_us, kStart_us + 500'000}) {
+    PlantState state;
+    ASSERT_TRUE(decode(encoded(plant_at(time_us)), state));
+    truth.add(state);
+  }
   EXPECT_TRUE(truth.reaches(kStart_us + 500'000));
   EXPECT_FALSE(truth.reaches(kStart_us + 500'001));
   for (const std::int64_t later_us : {0, 123'456, 250'000, 500'000}) {
@@ -107,7 +110,6 @@ TEST_F(Record, EveryStatusIsARowAndTheTruthOfItsInstantIsInIt) {
   for (std::int64_t k = 0; k < 1000; ++k) {
     if (k % 4 == 0) record.take(plant, encoded(plant_at(kStart_us + kPeriod_us * k)));
     EXPECT_TRUE(take(record, status_at(k)));
-    record.write_rows(false);
   }
   EXPECT_NEAR(record.time_s(), 2.0, 0.01);
   EXPECT_EQ(record.rows(), 1000);
