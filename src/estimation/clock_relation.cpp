@@ -12,6 +12,11 @@ namespace softarm {
 namespace {
 constexpr std::int64_t kBucketNs = 200'000'000;
 constexpr std::int64_t kMaxStampUs = 4'000'000'000'000'000;
+
+/// The remainder in [0, divisor), for times before zero too.
+std::int64_t modulo(std::int64_t value, std::int64_t divisor) noexcept {
+  return (value % divisor + divisor) % divisor;
+}
 }  // namespace
 
 ClockRelation::ClockRelation(ClockMode mode, double latency_s)
@@ -39,13 +44,13 @@ std::int64_t ClockRelation::capture_ns(std::int64_t arrival_ns, std::int64_t sen
 
   const std::int64_t sender_ns = 1000 * sender_us;
   const std::int64_t offset_ns = arrival_ns - sender_ns;
-  const std::int64_t period = arrival_ns / kBucketNs;
-  Bucket& newest = bucket_[static_cast<std::size_t>(period % kBuckets)];
+  const std::int64_t period = (arrival_ns - modulo(arrival_ns, kBucketNs)) / kBucketNs;
+  Bucket& newest = bucket_[static_cast<std::size_t>(modulo(period, kBuckets))];
   newest = newest.period == period ? Bucket{period, std::min(newest.least_ns, offset_ns)}
                                    : Bucket{period, offset_ns};
   std::int64_t least_ns = offset_ns;
   for (const Bucket& bucket : bucket_) {
-    if (bucket.period > period - kBuckets && bucket.period <= period && bucket.period >= 0) {
+    if (bucket.period > period - kBuckets && bucket.period <= period) {
       least_ns = std::min(least_ns, bucket.least_ns);
     }
   }

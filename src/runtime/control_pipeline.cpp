@@ -138,8 +138,9 @@ void ControlPipeline::validate_and_estimate(const TickInput& input, SafetyInput&
   safety.emergency_stop = input.emergency_stop;
   safety.shutdown = input.shutdown;
   output_.soft_limit = safety.soft_limit_exceeded;
-  output_.frame_age_s = newest_capture_ns_ == 0 ? std::numeric_limits<double>::quiet_NaN()
-                                                : to_seconds(input.now_ns - newest_capture_ns_);
+  output_.frame_age_s = newest_capture_ns_ == kNever
+                            ? std::numeric_limits<double>::quiet_NaN()
+                            : to_seconds(input.now_ns - newest_capture_ns_);
 }
 
 void ControlPipeline::watch(const TickInput& input, SafetyInput& safety) noexcept {

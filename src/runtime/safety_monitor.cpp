@@ -99,11 +99,6 @@ constexpr auto kRules = [] {
   return rules;
 }();
 
-/// now - then without overflow where `then` is never.
-std::int64_t age(std::int64_t now_ns, std::int64_t then_ns) noexcept {
-  return then_ns == kNever ? kForever : now_ns - then_ns;
-}
-
 /// The values named may come off the wire.
 template <class Enumeration, std::size_t count>
 const char* name_of(Enumeration value, const std::array<const char*, count>& names) noexcept {
@@ -186,13 +181,13 @@ CauseRule SafetyMonitor::worst_cause(const SafetyInput& input) const noexcept {
       .settings = settings_,
       .thresholds = thresholds_,
       .mode = mode_,
-      .frame_age_ns = age(input.now_ns, input.newest_capture_ns),
+      .frame_age_ns = age_ns(input.now_ns, input.newest_capture_ns),
       .tick_gap_ns = ticked_before ? input.now_ns - previous_tick_ns_ : 0,
       .measurement_age_ns =
           input.newest_measurement_ns == kNever
               ? kForever
               : input.now_ns - std::max(input.newest_measurement_ns, listening_since_ns_),
-      .go_age_ns = age(input.now_ns, input.newest_go_ns)};
+      .go_age_ns = age_ns(input.now_ns, input.newest_go_ns)};
   for (const Cause& cause : kCauses)
     if (cause.present(evidence)) return cause.rule;
   return {Reason::none, Mode::active, Clearance::good_frames};

@@ -96,7 +96,7 @@ struct ArmPlant::Implementation {
     integrator->reset(0.0, x, Eigen::VectorXd::Zero(x.size()));
   }
 
-  /// Tells the equation of motion what the valves will do from now on.
+  /// Passes what the valves will do from now on to the equation of motion.
   void drive() {
     if (valves.slewed()) {
       system->input().follow(integrator->time_s(), valves, map);
@@ -120,15 +120,15 @@ struct ArmPlant::Implementation {
       valves.command(pending.front().command_bar);
       pending.pop_front();
     }
-    jumped |= system->surroundings().enter(now);
+    jumped |= system->external_loads().enter(now);
   }
 
   Eigen::Vector3d displacement_m() const {
-    return system->surroundings().base_displacement_m(integrator->time_s());
+    return system->external_loads().base_displacement_m(integrator->time_s());
   }
 
   double next_event_s() const {
-    const double load_s = system->surroundings().until(integrator->time_s());
+    const double load_s = system->external_loads().until(integrator->time_s());
     return pending.empty() ? load_s : std::min(load_s, pending.front().due_s);
   }
 
@@ -146,7 +146,7 @@ struct ArmPlant::Implementation {
   std::unique_ptr<Integrator> integrator;
   Eigen::VectorXd present_nm, target_nm;
   Eigen::VectorXd driven_nm;  // the torque of the last call without a lag
-  bool jumped = false;        // the input did, since the integrator was last told
+  bool jumped = false;        // since the last input_jumped()
   std::deque<PendingCommand> pending;
   mutable std::vector<Eigen::Isometry3d> ends;
 };
@@ -205,7 +205,7 @@ void ArmPlant::reset(ConstVectorRef u_rad, ConstVectorRef velocity_radps,
   Eigen::VectorXd x(self.system->size());
   Eigen::VectorXd v(self.system->size());
   self.system->spread(u_rad, x);
-  self.system->spread_rate(u_rad, velocity_radps, v);
+  self.system->spread(velocity_radps, v);
   self.integrator->reset(self.integrator->time_s(), x, v);
 }
 
@@ -250,7 +250,7 @@ Eigen::Isometry3d ArmPlant::base() const noexcept {
 
 void ArmPlant::segment_ends(std::span<Eigen::Isometry3d> segment_ends) const noexcept {
   implementation_->system->segment_ends(implementation_->integrator->x(), segment_ends);
-  if (implementation_->system->surroundings().base_moves()) {
+  if (implementation_->system->external_loads().base_moves()) {
     const Eigen::Vector3d displacement = implementation_->displacement_m();
     for (Eigen::Isometry3d& end : segment_ends) end.translation() += displacement;
   }

@@ -83,7 +83,7 @@ LinkSystem::LinkSystem(const PlantSettings& settings)
   }
 }
 
-// All vectors are those of the inertial motion, told in the axes of the link at hand; gravity is an
+// All vectors are those of the inertial motion, in the axes of the link at hand; gravity is an
 // upward acceleration of the base.
 void LinkSystem::residual(double t_s, ConstVector x, ConstVector v, ConstVector a, Vector out) {
   const std::size_t count = links_.size();
@@ -118,7 +118,7 @@ void LinkSystem::residual(double t_s, ConstVector x, ConstVector v, ConstVector 
       moment_[j] += link.length_m * Vec3(-hung.y(), hung.x(), 0.0);
     }
   }
-  if (surroundings_.any_load_on()) subtract_loads(t_s);
+  if (external_loads_.any_load_on()) subtract_loads(t_s);
   Vec3 force = Vec3::Zero();
   Vec3 moment = Vec3::Zero();  // both that the link passes on, at its end
   for (std::size_t j = count; j-- > 0;) {
@@ -150,14 +150,14 @@ void LinkSystem::residual(double t_s, ConstVector x, ConstVector v, ConstVector 
 }
 
 LinkSystem::Vec3 LinkSystem::base_acceleration(double t_s) const {
-  if (!surroundings_.base_moves()) return Vec3::Zero();
-  return arm_.base_rotation.transpose() * surroundings_.base_acceleration_mps2(t_s);
+  if (!external_loads_.base_moves()) return Vec3::Zero();
+  return arm_.base_rotation.transpose() * external_loads_.base_acceleration_mps2(t_s);
 }
 
 void LinkSystem::subtract_loads(double t_s) {
-  for (const Surroundings::Load& load : surroundings_.loads()) {
+  for (const ExternalLoads::Load& load : external_loads_.loads()) {
     if (!load.on) continue;
-    const double scale = Surroundings::scale(load, t_s);
+    const double scale = ExternalLoads::scale(load, t_s);
     Vec3 force = scale * (arm_.base_rotation.transpose() * load.force_n);
     Vec3 moment = scale * (arm_.base_rotation.transpose() * load.moment_nm);
     const std::size_t end = last_link(load.segment);
@@ -192,7 +192,7 @@ void LinkSystem::place(ConstVector x) {
   }
 }
 
-// Composite rigid bodies, told in the base frame: B_ab is the power that the momentum of all that
+// Composite rigid bodies, in the base frame: B_ab is the power that the momentum of all that
 // angle b carries has on the motion of angle a, a being nearer the base.
 void LinkSystem::inertia(Matrix B) {
   double mass = 0.0;
@@ -272,9 +272,9 @@ void LinkSystem::add_input(double t_s, ConstVector x, Vector out) {
                         : tau[angle % 2];
     }
   }
-  for (const Surroundings::Load& load : surroundings_.loads()) {
+  for (const ExternalLoads::Load& load : external_loads_.loads()) {
     if (!load.on) continue;
-    const double scale = Surroundings::scale(load, t_s);
+    const double scale = ExternalLoads::scale(load, t_s);
     const std::size_t last = last_link(load.segment);
     const Vec3 end = origin_[last] + links_[last].length_m * rotation_[last].col(2);
     const Vec3 force = scale * (arm_.base_rotation.transpose() * load.force_n);
@@ -288,7 +288,7 @@ void LinkSystem::add_input(double t_s, ConstVector x, Vector out) {
 SecondOrderSystem::Powers LinkSystem::powers(double t_s, ConstVector x, ConstVector v) {
   scratch_.setZero();
   add_input(t_s, x, scratch_);
-  if (surroundings_.base_moves()) {
+  if (external_loads_.base_moves()) {
     inertia(inertia_);  // for the first moments that the angles carry
     scratch_.noalias() -= lever_.transpose() * base_acceleration(t_s);
   }

@@ -49,8 +49,8 @@ void PccSystem::add_couple(const Eigen::Vector2d& tau_nm, int first_piece, Const
 }
 
 void PccSystem::feel_base(double t_s) {
-  if (surroundings_.base_moves()) {
-    arm_.gravity_mps2 = gravity_mps2_ - surroundings_.base_acceleration_mps2(t_s);
+  if (external_loads_.base_moves()) {
+    arm_.gravity_mps2 = gravity_mps2_ - external_loads_.base_acceleration_mps2(t_s);
   }
 }
 
@@ -70,8 +70,8 @@ void PccSystem::add_input(double t_s, ConstVector u, Vector out) {
       add_couple(input_.tau_nm(t_s, i), first, u, out);
     }
   }
-  if (surroundings_.any_load_on()) {
-    loads_.add_external(surroundings_, t_s, u, out);
+  if (external_loads_.any_load_on()) {
+    loads_.add_external(external_loads_, t_s, u, out);
   }
 }
 
@@ -126,9 +126,9 @@ void PccSystem::linearize(double t_s, ConstVector u, ConstVector velocity, Const
 SecondOrderSystem::Powers PccSystem::powers(double t_s, ConstVector u, ConstVector velocity) {
   sum_.setZero();
   add_input(t_s, u, sum_);
-  if (surroundings_.base_moves()) {
+  if (external_loads_.base_moves()) {
     // Inertia forces of the base's acceleration, the only weight in this.
-    arm_.gravity_mps2 = -surroundings_.base_acceleration_mps2(t_s);
+    arm_.gravity_mps2 = -external_loads_.base_acceleration_mps2(t_s);
     above_.setZero();
     gravity_moments(arm_, workspace_, u, below_);
     if (loads_.has_payload()) loads_.add_payload(u, above_, above_, arm_.gravity_mps2, below_);

@@ -7,7 +7,6 @@
 
 #include "simulation/link_system.hpp"
 #include "simulation/pcc_system.hpp"
-#include "simulation/polar_link_system.hpp"
 
 namespace softarm {
 namespace {
@@ -69,9 +68,6 @@ ArmParameters pieces_of(const PlantSettings& settings) {
 }
 
 std::unique_ptr<PlantSystem> make_plant_system(const PlantSettings& settings) {
-  if (settings.kind == PlantKind::links && settings.links.joints == LinkJoints::polar) {
-    return std::make_unique<PolarLinkSystem>(settings);
-  }
   if (settings.kind == PlantKind::links) {
     return std::make_unique<LinkSystem>(settings);
   }

@@ -90,7 +90,7 @@ void DaemonLink::take_reference(const ReceivedMessage& packet) noexcept {
     ++malformed_;
     return;
   }
-  const bool forgotten = now_ns_ - newest_reference_ns_ > kNumberForgotten_ns;
+  const bool forgotten = age_ns(now_ns_, newest_reference_ns_) > kNumberForgotten_ns;
   if (reference_message_.sequence <= reference_sequence_ && !forgotten) return;
   reference_sequence_ = reference_message_.sequence;
   newest_reference_ns_ = now_ns_;
@@ -108,7 +108,7 @@ void DaemonLink::take_operator(const ReceivedMessage& packet) noexcept {
     return;
   }
   const bool newer = operator_message_.sequence > operator_sequence_ ||
-                     now_ns_ - newest_operator_ns_ > kNumberForgotten_ns;
+                     age_ns(now_ns_, newest_operator_ns_) > kNumberForgotten_ns;
   if (newer) operator_sequence_ = operator_message_.sequence;
   newest_operator_ns_ = now_ns_;
   // Whoever wants the arm vented is right, whatever the number; so is a request nobody knows.
@@ -161,7 +161,7 @@ void DaemonLink::publish_command(std::int64_t now_ns, const TickOutput& output) 
 }
 
 bool DaemonLink::command_expired(std::int64_t now_us) const noexcept {
-  return now_us - sent_us_ >= messages_.pressure_command.validity_us;
+  return sent_us_ == kNever || now_us - sent_us_ >= messages_.pressure_command.validity_us;
 }
 
 void DaemonLink::publish_status(std::int64_t now_ns, const ControlPipeline& pipeline,

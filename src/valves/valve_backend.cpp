@@ -22,8 +22,7 @@ std::map<std::string, ValveBackendFactory>& factories() {
 
 }  // namespace
 
-ValveBackendRegistration::ValveBackendRegistration(const std::string& name,
-                                                   ValveBackendFactory make) {
+void add_valve_backend(const std::string& name, ValveBackendFactory make) {
   if (!factories().emplace(name, std::move(make)).second)
     throw std::invalid_argument("two valve back ends of the name " + name);
 }

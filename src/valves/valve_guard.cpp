@@ -153,13 +153,13 @@ void ValveGuard::connected(bool success, std::int64_t now_ns) noexcept {
   ++counters_.connections;
   failures_ = 0;
   good_cycles_ = 0;
-  since_ns_ = now_ns;
   enter(ValveState::securing, ValveReason::none);
 }
 
 void ValveGuard::secured(LinkResult result, bool as_written, std::int64_t now_ns) noexcept {
   if (result == LinkResult::ok && as_written) {
-    since_ns_ = now_ns;
+    failures_ = 0;
+    starting_since_ns_ = now_ns;
     std::fill(off_since_ns_.begin(), off_since_ns_.end(), kNever);
     return enter(ValveState::starting, ValveReason::not_ready);
   }
@@ -181,12 +181,12 @@ void ValveGuard::failed(LinkResult result, std::int64_t now_ns) noexcept {
   counters_.broken += result == LinkResult::broken;
   if (result == LinkResult::broken) return disconnect(ValveReason::no_connection, now_ns);
   good_cycles_ = 0;
-  if (failures_++ == 0) since_ns_ = now_ns;
+  if (failures_++ == 0) failing_since_ns_ = now_ns;
   if (failures_ <= settings_.driver.tolerated_failures) return;
   if (result == LinkResult::no_answer) return disconnect(ValveReason::no_answer, now_ns);
   // It answers, so zero may still reach it; a terminal that refuses that too is left to its own
   // time-out.
-  if (now_ns - since_ns_ > kMostExceptions_ns)
+  if (now_ns - failing_since_ns_ > kMostExceptions_ns)
     return disconnect(ValveReason::exception_reply, now_ns);
   degrade(ValveReason::exception_reply, -1);
 }
@@ -223,7 +223,6 @@ void ValveGuard::exchanged(LinkResult result, const ReadBack& read_back,
   if (result != LinkResult::ok) return failed(result, now_ns);
   ++counters_.cycles;
   answered_ns_ = now_ns;
-  if (failures_ > 0) since_ns_ = now_ns;
   failures_ = 0;
   const bool zero = set_points_bar_.maxCoeff() <= 0.0;
   zero_confirmed_ = zero && (!read_back.has_echo ||
@@ -241,7 +240,7 @@ void ValveGuard::exchanged(LinkResult result, const ReadBack& read_back,
     if (wrong != ValveReason::none && wrong != ValveReason::stuck_valve) {
       reason_ = wrong;
       good_cycles_ = 0;
-      if (now_ns - since_ns_ > kMostStarting_ns) disconnect(wrong, now_ns);
+      if (now_ns - starting_since_ns_ > kMostStarting_ns) disconnect(wrong, now_ns);
     } else if (++good_cycles_ >= kStartCycles) {
       backoff_ns_ = first_backoff_ns_;
       enter(ValveState::vented, stopping_ ? ValveReason::shutdown : ValveReason::no_command);

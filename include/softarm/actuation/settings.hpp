@@ -12,6 +12,8 @@ namespace softarm {
 struct Chamber {
   double angle_rad = 0.0;
   double gain_nm_per_bar = 0.839;
+
+  bool operator==(const Chamber&) const = default;
 };
 
 /// What a command is made of.

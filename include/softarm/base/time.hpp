@@ -12,6 +12,11 @@ inline constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::min();
 /// The expiry of what does not expire: after every time of a clock.
 inline constexpr std::int64_t kForever = std::numeric_limits<std::int64_t>::max();
 
+/// How long ago `then_ns` was; for ever where it is kNever.
+inline std::int64_t age_ns(std::int64_t now_ns, std::int64_t then_ns) noexcept {
+  return then_ns == kNever ? kForever : now_ns - then_ns;
+}
+
 /// Seconds as nanoseconds, rounded to nearest; |seconds| below 9.2e9 (292 years).
 inline std::int64_t to_ns(double seconds) noexcept { return std::llround(1e9 * seconds); }
 

@@ -124,7 +124,7 @@ class ControlPipeline {
   std::array<std::int64_t, kMaxSegments> seen_ns_{};
   std::int64_t epoch_ns_ = 0;
   std::int64_t previous_ns_ = 0;
-  std::int64_t newest_capture_ns_ = 0;
+  std::int64_t newest_capture_ns_ = kNever;
   std::int64_t late_frames_ = 0;
   std::uint32_t activations_ = 0;
   bool ticked_ = false;

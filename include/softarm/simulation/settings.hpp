@@ -40,7 +40,7 @@ enum class PlantKind {
   links     ///< the paper's section VI: rigid links joined by two crossed revolute joints
 };
 
-/// `PlantKind::refined`. Weights tell how a segment's length, mass and bending rigidity E I (and
+/// `PlantKind::refined`. Weights say how a segment's length, mass and bending rigidity E I (and
 /// damping with it) vary along it, one number a piece; empty: all alike. Only their ratios count:
 /// length, mass, and the bend under a uniform moment stay those of the segment.
 struct RefinedSettings {
@@ -52,11 +52,8 @@ struct RefinedSettings {
 
 inline constexpr int kMaxLinksPerSegment = 64;
 
-/// In which pair of angles the two joints of a link are told.
-enum class LinkJoints {
-  crossed,  ///< a about x, then b about y: smooth
-  polar  ///< the paper's phi and theta, (a, b) = theta (-sin phi, cos phi): singular where straight
-};
+/// The two angles of a link's joint: a about x, then b about y.
+enum class LinkJoints { crossed };
 
 /// `PlantKind::links`. Stiffness and damping act about each of the two axes of a joint; left out
 /// they are those of the segment times the number of its links, so that equal moments on the joints
@@ -92,17 +89,16 @@ struct BaseMotion {
   double phase_rad = 0.0;
 };
 
-/// Which method of SUNDIALS integrates. The first three are diagonally implicit Runge-Kutta methods
-/// (stiffly accurate, no explicit first stage): a sampled command costs them nothing. The multistep
-/// methods start anew wherever the torque itself jumps. All but `erk` work on the O(n) residual.
+/// Which method of SUNDIALS integrates; docs/results/plant_methods.md has what each costs. The
+/// first three are diagonally implicit Runge-Kutta methods (stiffly accurate, no explicit first
+/// stage): a sampled command costs them nothing. All but `erk` work on the O(n) residual.
 enum class IntegratorMethod {
-  sdirk2,       ///< ARKODE: Alexander's two stages, order 2
-  cash4,        ///< ARKODE: Cash's five stages, order 4, embedded order 3
-  sdirk4,       ///< ARKODE: Hairer and Wanner's five stages, order 4, embedded order 3
-  erk,          ///< ARKODE: Dormand and Prince, explicit, order 5: for arms that are not stiff
-  cvode_bdf,    ///< CVODE: backward differences, order 1 to 5
-  cvode_adams,  ///< CVODE: Adams and Moulton, order 1 to 12: for arms that are not stiff
-  ida           ///< IDA: backward differences on r(t, x, v, v') = 0 itself, order 1 to 5
+  sdirk2,    ///< ARKODE: Alexander's two stages, order 2: least work under a sampled command
+  cash4,     ///< ARKODE: Cash's five stages, order 4: least error under a sampled command
+  sdirk4,    ///< ARKODE: Hairer and Wanner's five stages, order 4: least error of a free motion
+  erk,       ///< ARKODE: Dormand and Prince, order 5, on the explicit x'': an independent check
+  cvode_bdf  ///< CVODE: backward differences, order 1 to 5: fastest in a smooth motion; starts
+             ///< again wherever the torque itself jumps
 };
 
 /// The absolute tolerance of u' (rad/s) over that of u (rad), in 1/s.
@@ -117,7 +113,7 @@ struct IntegratorCounters {
   std::int64_t retries = 0;  ///< calls that failed once and then succeeded
 };
 
-/// The simulated arm. Its `arm` and `actuation` may differ from what the controller believes.
+/// The simulated arm. Its `arm` and `actuation` may differ from the controller's model.
 struct PlantSettings {
   PlantKind kind = PlantKind::pcc;
   RefinedSettings refined;

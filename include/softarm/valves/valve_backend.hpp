@@ -80,17 +80,22 @@ class ValveBackend {
 using ValveBackendFactory = std::function<std::unique_ptr<ValveBackend>(
     const ValveDriverSettings& settings, double max_pressure_bar)>;
 
-/// Adds a back end under the name that `valves.backend` may say. An object of static storage beside
-/// the class is the one line it takes:
+/// Adds a back end under a name, which `valves.backend` of an experiment may then say. Before the
+/// driver starts. @throws std::invalid_argument if the name is taken
+void add_valve_backend(const std::string& name, ValveBackendFactory make);
+
+/// The one line that a class of your own takes, beside it:
 ///
-///   const softarm::ValveBackendRegistration kBoard("my_board", [](const auto& settings, double) {
-///     return std::make_unique<MyBoard>(settings);
-///   });
+///   const softarm::ValveBackendRegistration<MyBoard> kRegistration("my_board");
 ///
-/// @throws std::invalid_argument if the name is taken
-class ValveBackendRegistration {
- public:
-  ValveBackendRegistration(const std::string& name, ValveBackendFactory make);
+/// Its constructor has one parameter, const ValveDriverSettings&.
+template <class Backend>
+struct ValveBackendRegistration {
+  explicit ValveBackendRegistration(const std::string& name) {
+    add_valve_backend(name, [](const ValveDriverSettings& settings, double) {
+      return std::make_unique<Backend>(settings);
+    });
+  }
 };
 
 /// The names that are known in this program: "modbus" and those registered.

@@ -135,7 +135,8 @@ class ValveGuard {
   std::int64_t woken_ns_ = kNever;
   std::int64_t next_attempt_ns_ = kNever;
   std::int64_t backoff_ns_;
-  std::int64_t since_ns_ = 0;  ///< when starting began, or the first of `failures_` happened
+  std::int64_t starting_since_ns_ = 0;
+  std::int64_t failing_since_ns_ = 0;  ///< the first of `failures_`
   std::int64_t written_ns_ = kNever;
   std::int64_t listening_since_ns_ = kNever;  ///< for commands of zero, or none
   std::int64_t answered_ns_ = 0;              ///< the cycle of the newest exchange that went well

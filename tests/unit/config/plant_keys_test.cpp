@@ -66,6 +66,8 @@ TEST(PlantKeys, TorqueIsForSimulatedArmsAlone) {
       "plant.actuation");
   refuses("plant: {kind: linsk}\n", "plant.kind");
   refuses("plant: {loads: [{segment: 3}]}\n", "plant.loads[0].segment");
+  refuses("plant: {integrator: ida}\n", "one of sdirk2, cash4, sdirk4, erk, cvode_bdf");
+  refuses("plant: {links: {joints: polar}}\n", "one of crossed");
   refuses("plant: {refined: {pieces: 2, mass_weights: [1, 2, 3]}}\n", "plant.refined.mass_weights");
 }
 

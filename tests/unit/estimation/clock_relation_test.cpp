@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <random>
+#include <vector>
 
 #include "softarm/base/time.hpp"
 
@@ -112,6 +113,24 @@ TEST(ClockRelation, RefusesANegativeLatency) {
   EXPECT_THROW(ClockRelation(ClockMode::sender, -1e-3), std::invalid_argument);
   EXPECT_THROW(ClockRelation(ClockMode::sender, std::numeric_limits<double>::quiet_NaN()),
                std::invalid_argument);
+}
+
+TEST(ClockRelation, TheOriginOfOurClockDoesNotMatter) {
+  const auto captures_from = [](std::int64_t start_ns) {
+    Network network;
+    ClockRelation relation(ClockMode::sender, 5e-3);
+    std::vector<std::int64_t> captures;
+    for (std::int64_t k = 0; k < 2000; ++k) {
+      const std::int64_t captured = k * 5'000'000;
+      captures.push_back(
+          relation.capture_ns(start_ns + network.arrival_ns(captured), network.stamp_us(captured)) -
+          start_ns);
+    }
+    return captures;
+  };
+  const std::vector<std::int64_t> expected = captures_from(0);
+  for (const std::int64_t start_s : {-1'000'000, -12, -4, 2, 1'000'000})  // whole windows of 2 s
+    EXPECT_TRUE(captures_from(start_s * 1'000'000'000) == expected) << start_s;
 }
 
 }  // namespace

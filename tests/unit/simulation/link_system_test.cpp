@@ -1,4 +1,4 @@
-// The links against mechanics written down anew: points and directions in long double, differenced.
+// The links against mechanics by another route: points and directions in long double, differenced.
 #include "simulation/link_system.hpp"
 
 #include <gtest/gtest.h>

@@ -79,7 +79,7 @@ class Scene {
         "  lcm: {{url: \"udpm://239.255.76.67:{}?ttl=0\"}}\n"
         "  safety: {{arming: automatic, frame_period_s: 0.01, frame_latency_s: 0, hold_after_s: "
         "1,\n"
-        "    vent_after_s: 2, hold_overruns: 1000000, vent_overruns: 1000000, valve_readback: "
+        "    vent_after_s: 2, hold_overruns: 999999, vent_overruns: 1000000, valve_readback: "
         "false}}\n"
         "  realtime: {{fifo: {}, priority: {}, cpu: {}}}\n",
         std::filesystem::absolute(options.config).string(), kTheta_rad, options.rate_hz,

@@ -16,7 +16,7 @@ class PlainCvode {
   ~PlainCvode();
 
   void reset(double t_s, const Eigen::VectorXd& x, const Eigen::VectorXd& v);
-  void input_jumped();           ///< starts anew
+  void input_jumped();           ///< starts again
   void advance(double t_end_s);  ///< @throw std::runtime_error
   Eigen::VectorXd x() const;
 

@@ -57,16 +57,13 @@ std::vector<Trial> trials_of(const PlantSettings& settings, Scene scene) {
     }
     add(sdirk2, {1e-4});
     if (small) add(cvode_bdf, {1e-6});
-    if (small) add(ida, {1e-6});
     if (soft) add(erk, {1e-5});
     return trials;
   }
   add(cvode_bdf, {1e-4, 1e-5, 1e-6, 1e-7, 1e-8});
-  add(ida, {1e-4, 1e-5, 1e-6, 1e-7, 1e-8});
   add(sdirk2, {1e-3, 1e-4, 1e-5});
   add(cash4, {1e-4, 1e-5, 1e-6});
   add(sdirk4, {1e-4, 1e-5, 1e-6});
-  if (soft) add(cvode_adams, {1e-4, 1e-6});
   if (soft) add(erk, {1e-4, 1e-6});
   return trials;
 }

@@ -44,8 +44,7 @@ std::string name(Scene scene) {
 }
 
 std::string name(IntegratorMethod method) {
-  constexpr const char* kNames[] = {"sdirk2",    "cash4",       "sdirk4", "erk",
-                                    "cvode_bdf", "cvode_adams", "ida"};
+  constexpr const char* kNames[] = {"sdirk2", "cash4", "sdirk4", "erk", "cvode_bdf"};
   return kNames[static_cast<std::size_t>(method)];
 }
 

@@ -1,4 +1,5 @@
-// What the world does to an arm beside gravity: loads on the segments' ends, and a base that moves.
+// What acts on an arm beside gravity and valves: loads on the segments' ends, and a base that
+// moves.
 #pragma once
 
 #include <Eigen/Core>
@@ -10,8 +11,8 @@ namespace softarm {
 
 /// External loads and the motion of the base, as functions of time. Loads begin and end at known
 /// instants; the integrator must stop there, so that it can neither step over a short blow nor see
-/// across a step: `until` tells when, `enter` what holds from an instant on.
-class Surroundings {
+/// across a step: `until` returns when, `enter` sets what holds from an instant on.
+class ExternalLoads {
  public:
   struct Load {
     int segment;  ///< from 0
@@ -22,7 +23,7 @@ class Surroundings {
   };
 
   /// @throw std::invalid_argument for loads or a motion that cannot be.
-  explicit Surroundings(const PlantSettings& settings);
+  explicit ExternalLoads(const PlantSettings& settings);
 
   bool any_load_on() const { return any_on_; }
   bool base_moves() const { return base_moves_; }

@@ -1,15 +1,14 @@
-// Every term of the model for one state, in the state's own coordinates.
+#include "softarm/control/evaluation.hpp"
+
 #include <cmath>
 #include <stdexcept>
 #include <utility>
 
-#include "apps/softarm/eval_case.hpp"
+#include "control/evaluated_motion.hpp"
 #include "softarm/model/actuation_matrix.hpp"
 #include "softarm/model/augmented_robot.hpp"
 #include "softarm/model/dynamics.hpp"
-#include "softarm/model/kinematics.hpp"
 #include "softarm/model/polar.hpp"
-#include "softarm/model/segment.hpp"
 
 namespace softarm {
 namespace {
@@ -18,81 +17,6 @@ namespace {
 constexpr double kSingularSine = 1e-14;
 
 using Shape = EvalTerm::Shape;
-
-/// What a route says about the arm's motion, in the case's coordinates.
-struct Motion {
-  explicit Motion(int n)
-      : ends(static_cast<std::size_t>(n)),
-        local(static_cast<std::size_t>(n), Eigen::MatrixXd::Identity(4, 4)),
-        centres(3, n),
-        J(3, 2 * n),
-        J_rate(3, 2 * n),
-        J_angular(3, 2 * n),
-        B(2 * n, 2 * n),
-        C(2 * n, 2 * n),
-        G(2 * n) {}
-
-  std::vector<Eigen::Isometry3d> ends;  ///< world pose of every segment's end
-  std::vector<Eigen::MatrixXd> local;   ///< the same relative to the segment's start
-  Eigen::Matrix3Xd centres, J, J_rate, J_angular;
-  Eigen::MatrixXd B, C;
-  Eigen::VectorXd G;
-  double kinetic_energy = 0.0, gravity_potential = 0.0;
-};
-
-void to_polar(const Eigen::VectorXd& q, Eigen::Matrix3Xd& jacobian) {
-  Eigen::MatrixXd copy = jacobian;
-  jacobian_to_polar(q, copy);
-  jacobian = copy;
-}
-
-/// By the route of the loop: in u, and from there to polar.
-Motion direct_motion(const EvalCase& in, DynamicsWorkspace& workspace, const Eigen::VectorXd& u,
-                     const Eigen::VectorXd& velocity) {
-  const ArmParameters& arm = in.arm;
-  Motion m(arm.size());
-  forward_kinematics(arm, u, m.ends);
-  for (std::size_t i = 0; i < m.local.size(); ++i) {
-    const Eigen::Vector2d one = u.segment<2>(2 * static_cast<Eigen::Index>(i));
-    m.local[i].topLeftCorner<3, 3>() = segment_rotation(one);
-    m.local[i].topRightCorner<3, 1>() = segment_tip(arm.segments[i].length_m, one);
-  }
-  mass_centres(arm, u, m.centres);
-  tip_jacobians(arm, u, velocity, m.J, m.J_rate);
-  tip_angular_jacobian(arm, u, m.J_angular);
-  dynamics_matrices(arm, workspace, u, velocity, m.B, m.C, m.G);
-  m.kinetic_energy = kinetic_energy(arm, workspace, u, velocity);
-  m.gravity_potential = gravity_potential(arm, u);
-  if (in.polar) {
-    Eigen::MatrixXd rate = m.J_rate;
-    jacobian_rate_to_polar(in.q, in.qd, m.J, rate);
-    m.J_rate = rate;
-    to_polar(in.q, m.J);
-    to_polar(in.q, m.J_angular);
-    dynamics_to_polar(in.q, in.qd, m.B, m.C, m.G);
-  }
-  return m;
-}
-
-/// By the rigid robot of Table I.
-Motion augmented_motion(const EvalCase& in, AugmentedRobot& robot) {
-  Motion m(in.arm.size());
-  robot.update(in.q, in.qd);
-  for (int i = 0; i < in.arm.size(); ++i) {
-    const auto at = static_cast<std::size_t>(i);
-    m.ends[at] = robot.segment_end(i + 1);
-    m.local[at] = (robot.segment_end(i).inverse() * m.ends[at]).matrix();
-    m.centres.col(i) = robot.mass_centre(i + 1);
-    m.gravity_potential -= in.arm.segments[at].mass_kg * in.arm.gravity_mps2.dot(m.centres.col(i));
-  }
-  robot.tip_jacobians(m.J, m.J_rate);
-  robot.tip_angular_jacobian(m.J_angular);
-  m.B = robot.B();
-  m.C = robot.C();
-  m.G = robot.G();
-  m.kinetic_energy = 0.5 * in.qd.dot(m.B * in.qd);
-  return m;
-}
 
 class Evaluation {
  public:
@@ -288,7 +212,7 @@ class Evaluation {
   int dof_;
   DynamicsWorkspace workspace_;
   Eigen::VectorXd u_, velocity_, K_, D_;
-  Motion motion_;
+  EvaluatedMotion motion_;
   std::vector<NamedTerm> terms_;
 };
 

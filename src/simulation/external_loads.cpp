@@ -1,4 +1,4 @@
-#include "simulation/surroundings.hpp"
+#include "simulation/external_loads.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -19,7 +19,7 @@ void require(bool holds, const std::string& key, const std::string& expected,
   }
 }
 
-Surroundings::Load checked(const ExternalLoad& load, int segments) {
+ExternalLoads::Load checked(const ExternalLoad& load, int segments) {
   require(load.segment >= 0 && load.segment <= segments, "loads.segment",
           "1 to " + std::to_string(segments) + ", or 0 for the tip", std::to_string(load.segment));
   require(load.force_n.allFinite() && load.moment_nm.allFinite(), "loads",
@@ -41,7 +41,7 @@ Surroundings::Load checked(const ExternalLoad& load, int segments) {
 
 }  // namespace
 
-Surroundings::Surroundings(const PlantSettings& settings)
+ExternalLoads::ExternalLoads(const PlantSettings& settings)
     : motion_(settings.base_motion),
       base_moves_(motion_.amplitude_m != Eigen::Vector3d::Zero() && motion_.frequency_hz != 0.0) {
   for (const ExternalLoad& load : settings.loads) {
@@ -57,12 +57,12 @@ Surroundings::Surroundings(const PlantSettings& settings)
   enter(0.0);
 }
 
-double Surroundings::scale(const Load& load, double t_s) {
+double ExternalLoads::scale(const Load& load, double t_s) {
   if (load.shape == LoadShape::constant) return 1.0;
   return std::sin(std::numbers::pi * (t_s - load.start_s) / (load.end_s - load.start_s));
 }
 
-double Surroundings::until(double t_s) const {
+double ExternalLoads::until(double t_s) const {
   double next = kForever_s;
   for (const Load& load : loads_) {
     for (const double instant : {load.start_s, load.end_s}) {
@@ -72,7 +72,7 @@ double Surroundings::until(double t_s) const {
   return next;
 }
 
-bool Surroundings::enter(double t_s) {
+bool ExternalLoads::enter(double t_s) {
   any_on_ = false;
   bool switched = false;
   for (Load& load : loads_) {
@@ -84,13 +84,13 @@ bool Surroundings::enter(double t_s) {
   return switched;
 }
 
-Eigen::Vector3d Surroundings::base_displacement_m(double t_s) const {
+Eigen::Vector3d ExternalLoads::base_displacement_m(double t_s) const {
   if (!base_moves_) return Eigen::Vector3d::Zero();
   const double rate = 2.0 * std::numbers::pi * motion_.frequency_hz;
   return std::sin(rate * t_s + motion_.phase_rad) * motion_.amplitude_m;
 }
 
-Eigen::Vector3d Surroundings::base_acceleration_mps2(double t_s) const {
+Eigen::Vector3d ExternalLoads::base_acceleration_mps2(double t_s) const {
   const double rate = 2.0 * std::numbers::pi * motion_.frequency_hz;
   return -rate * rate * base_displacement_m(t_s);
 }

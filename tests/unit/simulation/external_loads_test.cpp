@@ -26,8 +26,8 @@ PlantSettings three_segments(PlantKind kind) {
   return settings;
 }
 
-class Surrounded : public ::testing::TestWithParam<PlantKind> {};
-INSTANTIATE_TEST_SUITE_P(All, Surrounded,
+class AllKindsUnderLoads : public ::testing::TestWithParam<PlantKind> {};
+INSTANTIATE_TEST_SUITE_P(All, AllKindsUnderLoads,
                          ::testing::Values(PlantKind::pcc, PlantKind::refined, PlantKind::links));
 
 /// r with the load minus r without, at some state.
@@ -35,7 +35,7 @@ Eigen::VectorXd effect(const PlantSettings& with, const PlantSettings& without,
                        const Eigen::VectorXd& x, const Eigen::VectorXd& v, const Eigen::VectorXd& a,
                        double t_s = 0.0) {
   const auto loaded = make_plant_system(with), bare = make_plant_system(without);
-  loaded->surroundings().enter(t_s);
+  loaded->external_loads().enter(t_s);
   Eigen::VectorXd one(x.size()), other(x.size());
   loaded->residual(t_s, x, v, a, one);
   bare->residual(t_s, x, v, a, other);
@@ -68,7 +68,7 @@ Eigen::Isometry3d end_at(const PlantSettings& settings, const State& state, std:
   return ends[segment];
 }
 
-TEST_P(Surrounded, LoadsDoTheWorkOfForceAndMoment) {
+TEST_P(AllKindsUnderLoads, LoadsDoTheWorkOfForceAndMoment) {
   const PlantSettings bare = three_segments(GetParam());
   for (int segment = 1; segment <= 3; ++segment) {
     PlantSettings loaded = bare;
@@ -93,7 +93,7 @@ TEST_P(Surrounded, LoadsDoTheWorkOfForceAndMoment) {
   }
 }
 
-TEST_P(Surrounded, PayloadIsMassTimesAccelerationLessGravity) {
+TEST_P(AllKindsUnderLoads, PayloadIsMassTimesAccelerationLessGravity) {
   const PlantSettings bare = three_segments(GetParam());
   for (std::size_t segment = 0; segment < 3; ++segment) {
     PlantSettings loaded = bare;
@@ -120,7 +120,7 @@ TEST_P(Surrounded, PayloadIsMassTimesAccelerationLessGravity) {
   }
 }
 
-TEST_P(Surrounded, MovingBaseIsGravityTheOtherWay) {
+TEST_P(AllKindsUnderLoads, MovingBaseIsGravityTheOtherWay) {
   PlantSettings moving = three_segments(GetParam());
   moving.payload_kg = {0.0, 0.1, 0.2};
   moving.base_motion = {.amplitude_m = {0.02, 0.0, 0.01}, .frequency_hz = 3.0, .phase_rad = 0.4};
@@ -134,7 +134,7 @@ TEST_P(Surrounded, MovingBaseIsGravityTheOtherWay) {
   EXPECT_LT(change.norm(), 1e-13);
 }
 
-TEST_P(Surrounded, AllTogetherBalanceTheirEnergies) {
+TEST_P(AllKindsUnderLoads, AllTogetherBalanceTheirEnergies) {
   PlantSettings settings = three_segments(GetParam());
   settings.account_energy = true;
   settings.relative_tolerance = 1e-7;
@@ -159,7 +159,7 @@ TEST_P(Surrounded, AllTogetherBalanceTheirEnergies) {
   EXPECT_GT(std::abs(end.supplied), 0.01);
 }
 
-TEST(Surroundings, ABlowIsNotSteppedOverHoweverShort) {
+TEST(ExternalLoads, ABlowIsNotSteppedOverHoweverShort) {
   PlantSettings settings = three_segments(PlantKind::pcc);
   settings.arm.gravity_mps2.setZero();
   settings.initial_u_rad.setZero();
@@ -174,7 +174,7 @@ TEST(Surroundings, ABlowIsNotSteppedOverHoweverShort) {
   EXPECT_GT(plant.u_rad().norm(), 1e-5);
 }
 
-TEST(Surroundings, RefusesWhatCannotBe) {
+TEST(ExternalLoads, RefusesWhatCannotBe) {
   const PlantSettings good = three_segments(PlantKind::pcc);
   PlantSettings bad = good;
   bad.loads = {{.segment = 4}};
