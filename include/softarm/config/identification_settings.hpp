@@ -17,7 +17,7 @@ struct IdentificationSettings {
   std::vector<double> rest_u_rad;  ///< 2n: where the springs rest; empty: straight
   double cubic_nm_per_rad3 = 0.0;  ///< adds cubic |u - rest|^2 (u - rest) to K u
   double lag_s = 0.0;              ///< first order, from a set point to what bends the arm
-  double delay_s = 0.0;            ///< from a set point until a frame can show it
+  double dead_time_s = 0.0;        ///< from a set point until a frame can show it
 };
 
 }  // namespace softarm

@@ -47,7 +47,7 @@ struct ControllerSettings {
   std::vector<double> ki;
   double valve_lag_s =
       0.0;  ///< first-order lag inverted on the part of (17) that depends on the reference alone
-  double delay_s = 0.0;  ///< dead time of valves and tubes, for the load-time gain check alone
+  double dead_time_s = 0.0;  ///< of valves and tubes, for the gain check at load time alone
   double max_theta_rad = 2.5;     ///< soft limit on the reference's and the arm's theta
   double max_speed_radps = 20.0;  ///< soft limit on the reference's |u'| a segment
   double max_step_rad = 0.2;      ///< a larger jump of a live reference is refused
