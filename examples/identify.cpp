@@ -4,7 +4,8 @@
 #include <softarm/commissioning/identification/log_record.hpp>
 #include <softarm/config/load.hpp>
 
-int main(int, char** arguments) try {
+int main(int count, char** arguments) try {
+  if (count != 3) throw std::invalid_argument("usage: example_identify CONFIG LOG");
   const softarm::Experiment experiment = softarm::load_experiment(arguments[1]);
   const softarm::MotionRecord record =
       softarm::read_log(experiment, arguments[2], softarm::LoggedInput::commanded).record;

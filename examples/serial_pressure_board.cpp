@@ -56,4 +56,4 @@ class SerialBoard : public softarm::ValveBackend {
 
 const softarm::ValveBackendRegistration<SerialBoard> kRegistration("serial_board");
 
-int main(int argc, char** argv) { return softarm::run_valve_driver("serial_board", argc, argv); }
+int main(int argc, char** argv) { return softarm::run_valve_driver(argc, argv); }

@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <array>
+#include <filesystem>
 #include <memory>
 #include <stdexcept>
+#include <string>
 #include <utility>
 
 #include "apps/program.hpp"
@@ -33,7 +35,8 @@ ValveGuardSettings guard_settings(const Experiment& experiment) {
           .wait_for_zero = experiment.safety.arming == Arming::explicit_};
 }
 
-void print_summary(const char* program, const ValvesLoop& loop, const ValveCounters& counters) {
+void print_summary(const std::string& program, const ValvesLoop& loop,
+                   const ValveCounters& counters) {
   say(fmt::format(
       "{}: {} cycles, {} missed; {} connections, {} lost, {} late answers, {} exception replies, "
       "{} times degraded; {} commands refused\n",
@@ -42,7 +45,7 @@ void print_summary(const char* program, const ValvesLoop& loop, const ValveCount
 }
 
 /// Prints every change and reports to the service manager; true if zero was confirmed in the end.
-bool drive(const char* program, const Experiment& experiment, ValveDriver& driver) {
+bool drive(const std::string& program, const Experiment& experiment, ValveDriver& driver) {
   ServiceNotifier service;
   if (!service.problem().empty()) say(fmt::format("{}: warning: {}\n", program, service.problem()));
   LineLog log(program, say);  // before the scheduling changes, which its thread would inherit
@@ -68,7 +71,7 @@ bool drive(const char* program, const Experiment& experiment, ValveDriver& drive
   return vented;
 }
 
-int serve(const char* program, const std::string& path) {
+int serve(const std::string& program, const std::string& path) {
   const Experiment experiment = load_experiment(path);
   if (experiment.actuation.kind == ActuationKind::torque)
     throw ConfigError(path, 0, "actuation.kind", "chambers: a terminal has valves, not moments",
@@ -102,7 +105,8 @@ int serve(const char* program, const std::string& path) {
 
 }  // namespace
 
-int run_valve_driver(const char* program, int argc, char** argv) {
+int run_valve_driver(int argc, char** argv) {
+  const std::string program = std::filesystem::path(argv[0]).filename().string();
   CLI::App app("Pressure commands from LCM to valves, measured pressures back", program);
   std::string config;
   app.add_option("CONFIG", config, "experiment in YAML")->required();

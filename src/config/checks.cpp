@@ -272,7 +272,6 @@ class Checks {
 
   void check_valves() const {
     const ValveDriverSettings& it = experiment_.valves;
-    const SafetySettings& safety = experiment_.safety;
     const double max_bar = experiment_.actuation.max_pressure_bar;
     // Arms that have no terminal need not fit into one.
     if (experiment_.actuation.kind == ActuationKind::torque || !keys_.given("valves")) return;
@@ -284,10 +283,6 @@ class Checks {
     below("valves.response_timeout_s", it.response_timeout_s, period_s,
           "one period of valves.rate_hz");
     at_least("valves.longest_backoff_s", it.longest_backoff_s, it.backoff_s, "backoff_s");
-    if (safety.valve_readback) {
-      above("daemon.safety.valve_silence_s", safety.valve_silence_s, silent_s,
-            "tolerated_failures + 1 periods of valves.rate_hz", ": otherwise none is tolerated");
-    }
     below("valves.stuck_bar", it.stuck_bar, max_bar, "actuation.max_pressure_bar",
           ": otherwise no valve ever counts as stuck");
     require(it.failsafe_timeout_s >= silent_s, "valves.failsafe_timeout_s",

@@ -122,11 +122,10 @@ void describe_plant(Keys& key, Experiment& experiment) {
   constexpr auto kOptional = Presence::optional;
   key.section({"mismatch", "factors on the controller's model", kOptional, SectionKind::input_only},
               [&] { describe_mismatch(key, it); });
-  key.section({"arm", "keys of `arm` that differ here (not segments)", kOptional,
-               SectionKind::defaults_elsewhere},
-              [&] { describe_arm(key, it.arm, kOptional); });
-  key.section({"actuation", "keys of `actuation` that differ here", kOptional,
-               SectionKind::defaults_elsewhere},
+  key.section(
+      {"arm", "keys of `arm` that differ here (not segments)", kOptional, SectionKind::hint},
+      [&] { describe_arm(key, it.arm, kOptional); });
+  key.section({"actuation", "keys of `actuation` that differ here", kOptional, SectionKind::hint},
               [&] { describe_actuation(key, it.actuation, kOptional); });
   KEY(valves, "between commanded and real pressure (or torque, then in N m)");
   KEY(mocap, "simulated motion capture");

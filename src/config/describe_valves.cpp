@@ -40,7 +40,7 @@ void describe(Keys& key, ValveDriverSettings& it) {
   KEY(terminal, one_of(kTerminalNames),
       "whose registers are meant; none of them was tried on hardware; free: a plain map");
   if (key.reading()) it.registers = register_preset(it.terminal);
-  KEY(registers, "left out: those of the terminal", SectionKind::defaults_by_choice);
+  KEY(registers, "left out: those of the terminal", SectionKind::hint);
   KEY(rate_hz, from(1, 2000), "one block write and one block read each");
   KEY(response_timeout_s, from(1e-4, 1), "of one request, below one period");
   KEY(connect_timeout_s, from(1e-3, 0.5), "of one attempt to connect");

@@ -115,10 +115,7 @@ Json entry_schema(const Entry& entry, bool in_list, bool with_defaults) {
 Json section_schema(const Entry& section, bool in_list, bool with_defaults) {
   Json keys = Json::object();
   for (const Entry& entry : section.entries) {
-    const SectionKind kind = entry.key.kind;
-    const bool defaults = with_defaults && entry.in_force &&
-                          kind != SectionKind::defaults_elsewhere &&
-                          kind != SectionKind::defaults_by_choice;
+    const bool defaults = with_defaults && entry.in_force && entry.key.kind != SectionKind::hint;
     Json& schema = keys[entry.key.name] = entry_schema(entry, in_list, defaults);
     schema["description"] = entry.documentation();
     const Json fallback = default_of(entry);

@@ -113,6 +113,15 @@ std::vector<std::string> experiment_warnings(const Experiment& experiment) {
 
   const SafetyThresholds thresholds =
       resolve_thresholds(experiment.safety, 1.0 / experiment.rate_hz);
+  const double unanswered_s =
+      (experiment.valves.tolerated_failures + 1) / experiment.valves.rate_hz;
+  if (experiment.safety.valve_readback && unanswered_s >= experiment.safety.valve_silence_s) {
+    warnings.push_back(fmt::format(
+        "valves.tolerated_failures: so many failures last {:.3g} s, daemon.safety.valve_silence_s "
+        "is {:.3g} s: the daemon goes to FAULT before softarm-valves has tolerated them",
+        unanswered_s, experiment.safety.valve_silence_s));
+  }
+
   const MocapSettings& mocap = experiment.plant.mocap;
   const double oldest_s = mocap.latency_s + 1.0 / mocap.rate_hz;
   const double hold_s = to_seconds(thresholds.hold_after_ns);

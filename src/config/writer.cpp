@@ -56,14 +56,11 @@ class Writer {
     const bool absent = entry.kind == Entry::Kind::numbers && entry.numbers.empty();
     const SectionKind kind = entry.key.kind;
     if (!documented_ && (absent || kind == SectionKind::input_only)) return;
-    if (documented_ && !brief_) document(entry, depth);
+    if (documented_) document(entry, depth);
     const auto outer_hint = hint_depth_;
     if (documented_ && (absent || kind != SectionKind::plain) && !hint_depth_) hint_depth_ = depth;
-    const bool outer_brief =
-        std::exchange(brief_, brief_ || kind == SectionKind::defaults_elsewhere);
     write_value(entry, depth);
     hint_depth_ = outer_hint;
-    brief_ = outer_brief;
   }
 
   void write_value(const Entry& entry, int depth) {
@@ -78,12 +75,10 @@ class Writer {
     if (entry.kind == Entry::Kind::section) return write(entry.entries, depth + 1);
     if (entry.kind == Entry::Kind::one_or_each && entry.entries.size() == 1)
       return write(entry.entries.front().entries, depth + 1);
-    ++lists_;
     for (const Entry& item : entry.entries) {
       dash_ = true;
       write(item.entries, depth + 2);
     }
-    --lists_;
   }
 
   /// Indentation, and what makes a hint of a line that is not in force: "# " at the depth where
@@ -102,14 +97,15 @@ class Writer {
     dash_ = false;
   }
 
-  /// A wrapped comment; in lists once a key.
+  /// A wrapped comment, once for keys of one name, meaning and form.
   void document(const Entry& entry, int depth) {
     constexpr std::size_t kWidth = 100;
     const bool value = entry.kind == Entry::Kind::numbers || entry.kind == Entry::Kind::text;
     if (depth == 0 && !value) out_ += '\n';
-    const std::string text = entry.documentation();
-    if (lists_ > 0 && !explained_.insert(entry.key.name + text).second) return;
-    const std::string indent = margin(depth);
+    const std::string form = entry.form.text("", false);
+    if (!explained_.insert(fmt::format("{}{}{}", entry.key.name, entry.key.doc, form)).second)
+      return;
+    const std::string text = entry.documentation(), indent = margin(depth);
     const std::size_t width = kWidth - indent.size() - 2;
     for (std::string_view rest = text; !rest.empty();) {
       std::size_t cut = rest.size() <= width ? rest.size() : rest.rfind(' ', width);
@@ -122,10 +118,8 @@ class Writer {
   std::string out_;
   bool documented_;
   std::optional<int> hint_depth_;    ///< where a hint starts that is not in force
-  bool brief_ = false;               ///< keys already documented elsewhere
   bool dash_ = false;                ///< the next line starts an item of a list
-  int lists_ = 0;                    ///< around this place
-  std::set<std::string> explained_;  ///< already documented in items before
+  std::set<std::string> explained_;  ///< names, meanings and forms
 };
 
 }  // namespace

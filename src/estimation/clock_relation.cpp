@@ -11,7 +11,6 @@
 namespace softarm {
 namespace {
 constexpr std::int64_t kBucketNs = 200'000'000;
-constexpr std::int64_t kMaxStampUs = 4'000'000'000'000'000;
 
 /// The remainder in [0, divisor), for times before zero too.
 std::int64_t modulo(std::int64_t value, std::int64_t divisor) noexcept {
@@ -32,7 +31,7 @@ void ClockRelation::reset() noexcept {
 }
 
 std::int64_t ClockRelation::capture_ns(std::int64_t arrival_ns, std::int64_t sender_us) noexcept {
-  if (mode_ == ClockMode::latency || sender_us > kMaxStampUs || sender_us < -kMaxStampUs) {
+  if (mode_ == ClockMode::latency || !is_time_us(sender_us)) {
     return arrival_ns - latency_ns_;
   }
   if (has_stamp_ && sender_us < last_sender_us_) {

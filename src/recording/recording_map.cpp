@@ -13,7 +13,8 @@ namespace softarm {
 namespace {
 
 constexpr auto kRequired = Presence::required;
-const Form kText = from(1, 2000), kAnyTime;
+/// Of columns. A function: a map may be read before the variables of this file are there.
+Form names() { return from(1, 2000); }
 
 /// The map as it is written: names where RecordingMap has columns.
 struct NamedBody {
@@ -33,14 +34,14 @@ struct NamedMap {
 
 void describe_body(Keys& key, NamedBody& it) {
   key("id", it.id, from(0, 1e6), "of the body in our messages", kRequired);
-  key("position", it.position, kText, "names of the three columns x y z", kRequired);
-  key("orientation", it.orientation, kText, "names of the four columns, in quaternion_order",
+  key("position", it.position, names(), "names of the three columns x y z", kRequired);
+  key("orientation", it.orientation, names(), "names of the four columns, in quaternion_order",
       kRequired);
 }
 
 void describe_table(Keys& key, NamedMap& it, RecordingMap& map) {
   key("separator", it.separator, from(1, 1), "between the cells");
-  key("time", it.time, kText, "name of the time column");
+  key("time", it.time, names(), "name of the time column");
   key("time_unit_s", map.time_unit_s, above(0, 1e4), "one unit of time");
   key("position_unit_m", map.position_unit_m, above(0, 1e4), "one unit of position");
   key("up", map.up, one_of({"x", "y", "z"}), "axis of the world that points up");
@@ -50,15 +51,15 @@ void describe_table(Keys& key, NamedMap& it, RecordingMap& map) {
 }
 
 void describe_rest(Keys& key, NamedMap& it, RecordingMap& map) {
-  key("from_s", it.rest_from_s, kAnyTime, "begin of the window");
-  key("to_s", it.rest_to_s, kAnyTime, "end of the window");
+  key("from_s", it.rest_from_s, Form(), "begin of the window");
+  key("to_s", it.rest_to_s, Form(), "end of the window");
   key("base_rotation", map.base_rotation, base_rotation(), "of S_0 in the world (z up)");
 }
 
 void describe_pressures(Keys& key, NamedMap& it, RecordingMap& map) {
   key("unit_bar", map.pressure_unit_bar, above(0, 1e4), "one unit of pressure");
-  key("commanded", it.commanded, kText, "names of columns");
-  key("measured", it.measured, kText, "names of columns");
+  key("commanded", it.commanded, names(), "names of columns");
+  key("measured", it.measured, names(), "names of columns");
 }
 
 void describe_channels(Keys& key, RecordingMap& map) {

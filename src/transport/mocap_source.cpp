@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "softarm/base/time.hpp"
 #include "softarm/runtime/settings.hpp"
 #include "softarm/transport/message_decoding.hpp"
 #include "softarm/transport/settings.hpp"
@@ -10,13 +11,12 @@
 namespace softarm {
 namespace {
 
-constexpr std::int64_t kLatestStamp_us = 4'000'000'000'000'000;  // nanoseconds must not overflow
+constexpr std::int64_t kNonsense_us = kLatest_us + 1;  // no clock relation takes it
 
-/// Beyond what a clock relation takes, where it is nonsense.
 std::int64_t to_us(double time_s) noexcept {
   const double time_us = 1e6 * time_s;
-  return std::abs(time_us) <= static_cast<double>(kLatestStamp_us) ? std::llround(time_us)
-                                                                   : kLatestStamp_us + 1;
+  return std::abs(time_us) <= static_cast<double>(kLatest_us) ? std::llround(time_us)
+                                                              : kNonsense_us;
 }
 
 }  // namespace
@@ -61,7 +61,8 @@ MocapReceipt MocapSource::take(std::size_t channel, std::span<const std::byte> b
   } else {
     if (!decode(bytes, message_)) return MocapReceipt::malformed;
     adapter_.to_frame(message_, frame);
-    sender_time_us_ = message_.capture_time_us;
+    sender_time_us_ =
+        is_time_us(message_.capture_time_us) ? message_.capture_time_us : kNonsense_us;
   }
   frame.capture_ns = clock_.capture_ns(arrival_ns, sender_time_us_);
   return MocapReceipt::frame;
@@ -70,8 +71,7 @@ MocapReceipt MocapSource::take(std::size_t channel, std::span<const std::byte> b
 MocapReceipt MocapSource::take_body(std::size_t channel, std::span<const std::byte> bytes,
                                     std::int64_t arrival_ns, MocapFrame& frame) noexcept {
   softarm_messages::rigid_transform_t message;
-  if (channel >= channels_.size() || !decode(bytes, message) || message.utime > kLatestStamp_us ||
-      message.utime < -kLatestStamp_us)
+  if (channel >= channels_.size() || !decode(bytes, message) || !is_time_us(message.utime))
     return MocapReceipt::malformed;
   const std::size_t body = channel + (adapter_.base_is_fixed() ? 1 : 0);
   const auto outcome =

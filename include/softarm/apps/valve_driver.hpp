@@ -5,8 +5,9 @@ namespace softarm {
 
 /// Reads the command line (`CONFIG`, --help, --version), drives the valves with the back end that
 /// `valves.backend` names (ValveBackendRegistration) until SIGTERM, SIGINT or SIGHUP, and vents.
-/// Prints on stderr. Returns the exit code: docs/how-to/connect_valves.md. Throws nothing.
-/// @param program its name in what it prints
-int run_valve_driver(const char* program, int argc, char** argv);
+/// Prints on stderr, under the name of argv[0]. Returns the exit code: 0 zero was confirmed, or
+/// nothing was ever pressurised; 1 it was not confirmed, or an error; 64 command line; 75 another
+/// driver runs; 78 configuration. Throws nothing.
+int run_valve_driver(int argc, char** argv);
 
 }  // namespace softarm

@@ -12,6 +12,7 @@ namespace softarm {
 
 /// Words that stand for numbers, or numbers of a range, alone or in lists.
 struct Form {
+  /// What may stand for numbers.
   struct Word {
     std::string text;
     std::vector<double> numbers;

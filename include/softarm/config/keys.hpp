@@ -38,16 +38,17 @@ struct Location {
   int line = 0;  ///< 1-based
 };
 
+/// Whether a key may be left out.
 enum class Presence { optional, required };
 
 /// How a section is printed.
 enum class SectionKind {
   plain,
-  defaults_elsewhere,  ///< its defaults are values of other sections: the template only hints at it
-  defaults_by_choice,  ///< its defaults depend on the key before: the template only hints at it
-  input_only           ///< turned into values of other keys: not part of the resolved configuration
+  hint,       ///< its defaults follow from other keys: in the template a comment
+  input_only  ///< the same, and turned into values of other keys: not printed otherwise
 };
 
+/// What a key is called and means.
 struct Key {
   const char* name;
   const char* doc;
@@ -59,6 +60,7 @@ struct Key {
 
 /// A key with its value, as it was visited.
 struct Entry {
+  /// What is in it.
   enum class Kind { numbers, text, section, list, one_or_each };
   Key key;
   Kind kind;
@@ -74,8 +76,10 @@ struct Entry {
   std::string documentation() const;
 };
 
+/// Visits declarations for one purpose.
 class Keys {
  public:
+  /// What variables are visited for.
   enum class Purpose {
     read,      ///< variables from a file
     print,     ///< variables, in the form that is exact

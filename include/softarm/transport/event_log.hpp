@@ -15,6 +15,8 @@
 #include <string_view>
 #include <vector>
 
+#include "softarm/base/time.hpp"
+
 namespace softarm {
 
 /// One logged message; channel and data are valid until the next is read.
@@ -27,8 +29,7 @@ struct LogEvent {
 
   /// The same in ns; nothing where it is no time whose nanoseconds can be added and subtracted.
   std::optional<std::int64_t> arrival_ns() const noexcept {
-    constexpr std::int64_t kLatest_us = 4'000'000'000'000'000;
-    if (time_us < 0 || time_us >= kLatest_us) return std::nullopt;
+    if (time_us < 0 || !is_time_us(time_us)) return std::nullopt;
     return 1000 * time_us;
   }
 };

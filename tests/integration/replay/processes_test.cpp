@@ -102,6 +102,7 @@ class ReplayOfProcesses : public ::testing::Test {
       ASSERT_TRUE(reach(Mode::active)) << daemon->printed();
       plant->signal(SIGKILL);
       ASSERT_TRUE(reach(Mode::vent)) << daemon->printed();
+      plant->wait(10s);  // it holds its lock until it is gone
       plant = start("softarm-plant", {config_});
       ASSERT_TRUE(reach(Mode::active)) << daemon->printed() << plant->printed();
       ++rounds_;

@@ -47,8 +47,6 @@ const Hidden kHidden[] = {
     {"safety: {valve_readback: true, pressure_tolerance_bar: 1}", "",
      "daemon.safety.pressure_tolerance_bar", "actuation.max_pressure_bar"},
     {"", "valves: {stuck_bar: 1}\n", "valves.stuck_bar", "actuation.max_pressure_bar"},
-    {"safety: {valve_readback: true}", "valves: {tolerated_failures: 30, failsafe_timeout_s: 1}\n",
-     "daemon.safety.valve_silence_s", "tolerated_failures"},
 };
 
 class HiddenThreshold : public testing::TestWithParam<Hidden> {};
@@ -80,6 +78,19 @@ TEST(Thresholds, ThatComeIntoForceAreAccepted) {
            {"safety: {valve_readback: true}", "valves: {stuck_bar: 0.9}\n"}})
     EXPECT_NO_THROW(load_experiment(folder.write("e.yaml", experiment_text(daemon, other))))
         << daemon << other;
+}
+
+/// The first is the daemon's, the second the valve driver's: both may be meant.
+TEST(Thresholds, ToleratedFailuresThatTheDaemonDoesNotBearAreWarnedOf) {
+  const TestFolder folder;
+  const auto warnings = [&](const char* valves) {
+    return experiment_warnings(load_experiment(
+        folder.write("e.yaml", experiment_text("safety: {valve_readback: true}", valves))));
+  };
+  EXPECT_TRUE(warnings("valves: {tolerated_failures: 18, failsafe_timeout_s: 1}\n").empty());
+  const auto some = warnings("valves: {tolerated_failures: 19, failsafe_timeout_s: 1}\n");
+  ASSERT_EQ(some.size(), 1u);
+  EXPECT_NE(some[0].find("valves.tolerated_failures"), std::string::npos) << some[0];
 }
 
 }  // namespace
