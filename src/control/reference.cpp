@@ -17,7 +17,6 @@
 namespace softarm {
 namespace {
 
-constexpr double kQuinticPeakSpeed = 1.875;
 constexpr double kShortestLive = 0.05;  ///< s, for a live reference that is corrected a little
 
 double largest_norm(const SegmentVector& v) noexcept {

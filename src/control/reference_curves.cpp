@@ -13,8 +13,6 @@ namespace {
 
 using std::numbers::pi;
 
-constexpr double kQuinticPeakSpeed = 1.875;  ///< of a minimum-jerk motion over its mean speed
-
 template <class... Functions>
 struct Overloaded : Functions... {
   using Functions::operator()...;

@@ -6,6 +6,9 @@
 
 namespace softarm {
 
+/// Of a minimum-jerk (quintic) motion over its mean speed.
+inline constexpr double kQuinticPeakSpeed = 1.875;
+
 /// All three vectors of `out` must have their size; has_polar is set for (24).
 void evaluate(const SetPointReference& curve, double time_s, ReferenceSample& out) noexcept;
 void evaluate(const PaperReference& curve, double time_s, ReferenceSample& out) noexcept;

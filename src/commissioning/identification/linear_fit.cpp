@@ -7,6 +7,9 @@
 #include <cmath>
 #include <numbers>
 #include <stdexcept>
+#include <utility>
+
+#include "commissioning/median.hpp"
 
 namespace softarm {
 namespace {
@@ -62,9 +65,7 @@ double typical_period_s(const MotionRecord& record) {
   std::vector<double> gaps;
   for (Eigen::Index k = 1; k < record.time_s.size(); ++k)
     gaps.push_back(record.time_s[k] - record.time_s[k - 1]);
-  std::nth_element(gaps.begin(), gaps.begin() + static_cast<std::ptrdiff_t>(gaps.size() / 2),
-                   gaps.end());
-  return gaps[gaps.size() / 2];
+  return median(std::move(gaps));
 }
 
 SmoothMotion smooth(const MotionRecord& record, double window_s, double lag_s, double dead_time_s) {
