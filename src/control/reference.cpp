@@ -17,7 +17,6 @@
 namespace softarm {
 namespace {
 
-constexpr double kQuinticPeakSpeed = 1.875;
 constexpr double kShortestLive = 0.05;  ///< s, for a live reference that is corrected a little
 
 double largest_norm(const SegmentVector& v) noexcept {
@@ -237,12 +236,11 @@ Reference::Reference(const ReferenceSettings& settings, const ControllerSettings
   double begin = 0.0;
   for (std::size_t i = 0; i < settings.phases.size(); ++i) {
     const ReferencePhase& phase = settings.phases[i];
-    const std::string where = fmt::format("reference, phase {}", i + 1);
-    check_phase(where, phase.kind, control, segments);
+    check_phase(static_cast<int>(i), phase.kind, control, segments);
     const bool last = i + 1 == settings.phases.size();
     if (!last && !(std::isfinite(phase.duration_s) && phase.duration_s > 0.0)) {
-      throw std::invalid_argument(
-          fmt::format("{}: expected a duration (s) > 0, got {}", where, phase.duration_s));
+      throw ReferenceError(static_cast<int>(i), ".duration_s", "a duration (s) > 0",
+                           fmt::format("{}", phase.duration_s));
     }
     State::Phase made;
     made.kind = phase.kind;

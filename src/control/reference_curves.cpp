@@ -6,15 +6,12 @@
 #include <cmath>
 #include <numbers>
 #include <stdexcept>
-
-#include "softarm/control/task_space_path.hpp"
+#include <utility>
 
 namespace softarm {
 namespace {
 
 using std::numbers::pi;
-
-constexpr double kQuinticPeakSpeed = 1.875;  ///< of a minimum-jerk motion over its mean speed
 
 template <class... Functions>
 struct Overloaded : Functions... {
@@ -46,51 +43,79 @@ double largest_distance(const std::vector<double>& a, const std::vector<double>&
   return distance;
 }
 
-void check_u(const std::string& where, const std::vector<double>& u_rad, int segments) {
-  if (u_rad.size() != static_cast<std::size_t>(2 * segments)) {
-    throw std::invalid_argument(fmt::format("{}: expected u of {} numbers (2 a segment), got {}",
-                                            where, 2 * segments, u_rad.size()));
+/// A place within a phase, for what is wrong there.
+struct Place {
+  int phase;
+  std::string at = "";
+
+  void require(bool holds, const std::string& expected, const std::string& got) const {
+    if (!holds) throw ReferenceError(phase, at, expected, got);
   }
-  for (double value : u_rad) {
-    if (!std::isfinite(value)) {
-      throw std::invalid_argument(fmt::format("{}: expected finite u, got {}", where, value));
-    }
+  void require_finite(std::initializer_list<double> values) const {
+    for (const double value : values)
+      require(std::isfinite(value), "finite numbers", fmt::format("{}", value));
   }
+};
+
+void check_u(const Place& place, const std::vector<double>& u_rad,
+             const ControllerSettings& control, int segments) {
+  place.require(u_rad.size() == static_cast<std::size_t>(2 * segments),
+                fmt::format("u of {} numbers (2 a segment)", 2 * segments),
+                fmt::format("{}", u_rad.size()));
+  for (const double value : u_rad) place.require_finite({value});
+  const double theta = largest_theta(u_rad);
+  place.require(theta <= control.max_theta_rad,
+                fmt::format("theta within control.max_theta_rad ({} rad)", control.max_theta_rad),
+                fmt::format("{:.6g} rad", theta));
 }
 
-void check_paper(const std::string& where, const PaperReference& r) {
-  for (double value : {r.theta_rad, r.rise_s, r.phi_centre_rad, r.phi_amplitude_rad, r.rate_radps,
-                       r.phase_step_rad}) {
-    if (!std::isfinite(value)) {
-      throw std::invalid_argument(fmt::format("{}: expected finite numbers, got {}", where, value));
-    }
-  }
-  if (r.theta_rad < 0.0 || r.rise_s < 0.0) {
-    throw std::invalid_argument(
-        fmt::format("{}: expected theta (rad) and rise time (s) >= 0, got {} and {}", where,
-                    r.theta_rad, r.rise_s));
-  }
+void check(const Place& place, const SetPointReference& r, const ControllerSettings& control,
+           int segments) {
+  check_u(place, r.u_rad, control, segments);
 }
 
-void check_way_points(const std::string& where, const WayPointReference& r, int segments) {
-  if (r.points.empty()) {
-    throw std::invalid_argument(where + ": expected at least one way point, got none");
-  }
+void check(const Place& place, const PaperReference& r, const ControllerSettings& control, int) {
+  place.require_finite({r.theta_rad, r.rise_s, r.phi_centre_rad, r.phi_amplitude_rad, r.rate_radps,
+                        r.phase_step_rad});
+  place.require(r.theta_rad >= 0.0 && r.rise_s >= 0.0, "theta (rad) and rise time (s) >= 0",
+                fmt::format("{} and {}", r.theta_rad, r.rise_s));
+  Place{place.phase, ".theta_rad"}.require(
+      r.theta_rad <= control.max_theta_rad,
+      fmt::format("at most control.max_theta_rad ({} rad)", control.max_theta_rad),
+      fmt::format("{} rad", r.theta_rad));
+}
+
+void check(const Place& place, const WayPointReference& r, const ControllerSettings& control,
+           int segments) {
+  place.require(!r.points.empty(), "at least one way point", "none");
   for (std::size_t i = 0; i < r.points.size(); ++i) {
-    const WayPoint& point = r.points[i];
-    check_u(fmt::format("{}, way point {}", where, i + 1), point.u_rad, segments);
-    const double after = i == 0 ? -1e-300 : r.points[i - 1].time_s;
-    if (!std::isfinite(point.time_s) || !(point.time_s > after)) {
-      throw std::invalid_argument(
-          fmt::format("{}, way point {}: expected a time (s) >= 0 and after the one before, got {}",
-                      where, i + 1, point.time_s));
-    }
+    const double time_s = r.points[i].time_s;
+    const Place point{place.phase, fmt::format(".points[{}]", i)};
+    check_u(point, r.points[i].u_rad, control, segments);
+    const Place time{place.phase, point.at + ".time_s"};
+    time.require_finite({time_s});
+    time.require(time_s >= 0.0, "at least 0 s", fmt::format("{} s", time_s));
+    time.require(i == 0 || time_s > r.points[i - 1].time_s, "later than the point before",
+                 fmt::format("{} s", time_s));
   }
-  if (r.repeat && (r.points.size() < 2 ||
-                   largest_distance(r.points.front().u_rad, r.points.back().u_rad) > 1e-9)) {
-    throw std::invalid_argument(
-        where + ": expected the last way point to equal the first, since they repeat");
-  }
+  if (!r.repeat) return;
+  const Place points{place.phase, ".points"};
+  points.require(r.points.size() >= 2, "at least 2 points to repeat",
+                 fmt::format("{}", r.points.size()));
+  const double apart = largest_distance(r.points.front().u_rad, r.points.back().u_rad);
+  points.require(apart <= 1e-9, "the last way point to equal the first, since they repeat",
+                 fmt::format("one {:.3g} rad away", apart));
+}
+
+void check(const Place& place, const LiveReference& r, const ControllerSettings&, int) {
+  place.require(std::isfinite(r.timeout_s) && r.timeout_s >= 0.0, "a timeout (s) >= 0",
+                fmt::format("{}", r.timeout_s));
+}
+
+void check(const Place& place, const TipPathReference& r, const ControllerSettings&, int) {
+  place.require(r.centre_m.allFinite() && r.first_axis_m.allFinite() &&
+                    r.second_axis_m.allFinite() && std::isfinite(r.rate_radps),
+                "a path of finite numbers", "one that is not");
 }
 
 }  // namespace
@@ -193,31 +218,23 @@ double largest_speed_radps(const ReferenceKind& kind) noexcept {
       kind);
 }
 
-void check_phase(const std::string& where, const ReferenceKind& kind,
-                 const ControllerSettings& control, int segments) {
-  std::visit(Overloaded{[&](const SetPointReference& r) { check_u(where, r.u_rad, segments); },
-                        [&](const PaperReference& r) { check_paper(where, r); },
-                        [&](const WayPointReference& r) { check_way_points(where, r, segments); },
-                        [&](const LiveReference& r) {
-                          if (!std::isfinite(r.timeout_s) || r.timeout_s < 0.0) {
-                            throw std::invalid_argument(fmt::format(
-                                "{}: expected a timeout (s) >= 0, got {}", where, r.timeout_s));
-                          }
-                        },
-                        [&](const TipPathReference& r) { check_tip_path(where, r); }},
-             kind);
-  const double theta = largest_theta_rad(kind), speed = largest_speed_radps(kind);
-  if (theta > control.max_theta_rad) {
-    throw std::invalid_argument(
-        fmt::format("{}: expected theta within max_theta_rad = {} rad, got {:.4g}", where,
-                    control.max_theta_rad, theta));
-  }
-  if (speed > control.max_speed_radps) {
-    throw std::invalid_argument(
-        fmt::format("{}: expected speeds within max_speed_radps = {} rad/s, got up to {:.4g}; give "
-                    "it more time",
-                    where, control.max_speed_radps, speed));
-  }
+ReferenceError::ReferenceError(int phase, const std::string& place, std::string expected_text,
+                               std::string got_text)
+    : std::invalid_argument(fmt::format("reference[{}]{}: expected {}, got {}", phase, place,
+                                        expected_text, got_text)),
+      key(fmt::format("reference[{}]{}", phase, place)),
+      expected(std::move(expected_text)),
+      got(std::move(got_text)) {}
+
+void check_phase(int phase, const ReferenceKind& kind, const ControllerSettings& control,
+                 int segments) {
+  const Place place{phase};
+  std::visit([&](const auto& r) { check(place, r, control, segments); }, kind);
+  const double speed = largest_speed_radps(kind);
+  place.require(
+      speed <= control.max_speed_radps,
+      fmt::format("speeds within control.max_speed_radps ({} rad/s)", control.max_speed_radps),
+      fmt::format("up to {:.4g} rad/s; give it more time", speed));
 }
 
 double largest_theta_rad(const ReferenceSettings& settings) noexcept {

@@ -6,6 +6,9 @@
 
 namespace softarm {
 
+/// Of a minimum-jerk (quintic) motion over its mean speed.
+inline constexpr double kQuinticPeakSpeed = 1.875;
+
 /// All three vectors of `out` must have their size; has_polar is set for (24).
 void evaluate(const SetPointReference& curve, double time_s, ReferenceSample& out) noexcept;
 void evaluate(const PaperReference& curve, double time_s, ReferenceSample& out) noexcept;
@@ -15,9 +18,8 @@ void evaluate(const WayPointReference& curve, double time_s, ReferenceSample& ou
 double largest_theta_rad(const ReferenceKind& kind) noexcept;
 double largest_speed_radps(const ReferenceKind& kind) noexcept;
 
-/// Throws std::invalid_argument, starting with `where`, if the phase does not fit the arm or the
-/// limits.
-void check_phase(const std::string& where, const ReferenceKind& kind,
-                 const ControllerSettings& control, int segments);
+/// @throws ReferenceError if the phase does not fit the arm or the limits
+void check_phase(int phase, const ReferenceKind& kind, const ControllerSettings& control,
+                 int segments);
 
 }  // namespace softarm

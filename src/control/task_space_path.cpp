@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <stdexcept>
 
 namespace softarm {
 
@@ -32,13 +31,6 @@ double largest_distance_m(const TipPathReference& path, const Eigen::Vector3d& f
     largest = std::max(largest, (evaluate(unit, angle).position_m - from_m).norm());
   }
   return largest;
-}
-
-void check_tip_path(const std::string& where, const TipPathReference& path) {
-  if (!path.centre_m.allFinite() || !path.first_axis_m.allFinite() ||
-      !path.second_axis_m.allFinite() || !std::isfinite(path.rate_radps)) {
-    throw std::invalid_argument(where + ": expected a path of finite numbers, got one that is not");
-  }
 }
 
 }  // namespace softarm

@@ -10,6 +10,7 @@
 #include "softarm/simulation/lock_step.hpp"
 
 namespace softarm {
+
 LoggedRun::LoggedRun(const Experiment& experiment, const std::filesystem::path& log)
     : experiment_(experiment),
       pipeline_(experiment),

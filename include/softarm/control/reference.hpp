@@ -10,6 +10,8 @@
 #pragma once
 
 #include <memory>
+#include <stdexcept>
+#include <string>
 
 #include "softarm/control/inverse_kinematics.hpp"
 #include "softarm/control/settings.hpp"
@@ -53,6 +55,17 @@ enum class LiveVerdict {
   step_too_large  ///< further than max_step_rad from the reference so far
 };
 
+/// What is wrong with a phase of a reference. what() is "reference[1].points[2].time_s: expected X,
+/// got Y", with the key that an experiment has there.
+class ReferenceError : public std::invalid_argument {
+ public:
+  /// @param place  within the phase, such as ".points[2].time_s"; empty: the phase as a whole
+  ReferenceError(int phase, const std::string& place, std::string expected_text,
+                 std::string got_text);
+
+  std::string key, expected, got;
+};
+
 /// Largest theta that a reference reaches, live ones apart (0).
 double largest_theta_rad(const ReferenceSettings& settings) noexcept;
 
@@ -74,8 +87,8 @@ double largest_theta_rad(const ReferenceSettings& settings) noexcept;
 /// derivatives exact), and flagged; a blend that still exceeds max_speed_radps is only flagged.
 class Reference {
  public:
-  /// Throws std::invalid_argument (phase, expected, got) for sizes, times or limits that do not
-  /// fit.
+  /// Throws ReferenceError for sizes, times or limits of a phase that do not fit, and
+  /// std::invalid_argument for other settings.
   Reference(const ReferenceSettings& settings, const ControllerSettings& control,
             const ArmParameters& arm);
   /// Where no phase is in task space, the number of segments is all that matters.

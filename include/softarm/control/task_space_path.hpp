@@ -2,8 +2,6 @@
 // of the phase.
 #pragma once
 
-#include <string>
-
 #include "softarm/control/inverse_kinematics.hpp"
 #include "softarm/control/settings.hpp"
 
@@ -14,8 +12,5 @@ TipReference evaluate(const TipPathReference& path, double time_s) noexcept;
 
 /// How far the path goes from a point, at 720 instants of its period.
 double largest_distance_m(const TipPathReference& path, const Eigen::Vector3d& from_m) noexcept;
-
-/// Throws std::invalid_argument, starting with `where`, for numbers that are not finite.
-void check_tip_path(const std::string& where, const TipPathReference& path);
 
 }  // namespace softarm
