@@ -184,6 +184,36 @@ void describe_actuation(SchemaVisitor& visitor, ActuationSettings& actuation, in
       actuation.plane_rad);
 }
 
+void describe_observer(SchemaVisitor& visitor, EstimationSettings& estimation) {
+  static const std::array<const char*, 2> kObservers = {"kinematic", "model"};
+  visitor.choice({"observer", "",
+                  "of u and u': kinematic (a filter on u alone) or model (a Kalman filter on (16), "
+                  "with a disturbance and parameters)"},
+                 kObservers, estimation.observer);
+  ModelObserverSettings& model = estimation.model_observer;
+  visitor.section({"model_observer", "", "of observer: model"}, SectionKind::plain, [&] {
+    visitor.flag({"learn_parameters", "",
+                  "stiffness, damping, gain and a horizontal load of every segment, on line"},
+                 model.learn_parameters);
+    visitor.number({"parameter_deviation", "",
+                    "standard deviation of the parameters before anything was learnt, relative",
+                    above_to(0.0, 1.0)},
+                   model.parameter_deviation);
+    visitor.number({"parameter_drift_per_sqrt_s", "1/s^0.5", "random walk of the parameters",
+                    from_to(0.0, 1.0)},
+                   model.parameter_drift_per_sqrt_s);
+    visitor.number({"disturbance_drift_per_sqrt_s", "1/s^0.5",
+                    "random walk of the disturbance over the torque that bends a segment by 1 rad, "
+                    "at least",
+                    above_to(0.0, 10.0)},
+                   model.disturbance_drift_per_sqrt_s);
+    visitor.number(
+        {"largest_disturbance_drift_per_sqrt_s", "1/s^0.5",
+         "the same, at most: it grows while the disturbance is seen to move", above_to(0.0, 10.0)},
+        model.largest_disturbance_drift_per_sqrt_s);
+  });
+}
+
 void describe_estimation(SchemaVisitor& visitor, EstimationSettings& estimation) {
   static const std::array<const char*, 3> kMethods = {"pose", "orientation", "printed"};
   visitor.choice({"method", "",
@@ -203,6 +233,7 @@ void describe_estimation(SchemaVisitor& visitor, EstimationSettings& estimation)
   visitor.integer(
       {"predicted_frames", "", "frames an occluded segment may be predicted for", from_to(0, 1000)},
       estimation.predicted_frames);
+  describe_observer(visitor, estimation);
   visitor.number({"quaternion_tolerance", "", "a frame with ||q| - 1| above it is rejected",
                   above_to(0.0, 1.0)},
                  estimation.quaternion_tolerance);
@@ -239,6 +270,11 @@ void describe_control(SchemaVisitor& visitor, ControllerSettings& control, int s
   visitor.numbers({"ki_nm_per_rad_s", "N m/(rad s)",
                    "integral gain on u, in the same forms; not in the paper", from_to(0.0, 1e4)},
                   gains, control.ki);
+  static const std::array<const char*, 3> kRejections = {"cancel", "model_only", "none"};
+  visitor.choice({"disturbance", "",
+                  "what the model observer found: cancel (parameters and disturbance), model_only "
+                  "(parameters; the arm stays soft), none"},
+                 kRejections, control.disturbance);
   visitor.number(
       {"valve_lag_s", "s", "first-order lag inverted on what depends on the reference alone",
        from_to(0.0, 5.0)},

@@ -10,6 +10,23 @@ enum class CurvatureMethod {
   printed       ///< the paper's (20) as printed, for comparison only
 };
 
+/// What u and u' at the tick come from.
+enum class ObserverKind {
+  kinematic,  ///< CurvatureFilter: a polynomial through the measurements, no model of the arm
+  model       ///< ModelObserver: a Kalman filter on (16) with disturbance and parameters
+};
+
+/// Of the model-based observer; physical quantities, none of which needs tuning for a usual arm.
+struct ModelObserverSettings {
+  bool learn_parameters = true;  ///< stiffness, damping, gain, horizontal load a segment, on line
+  double parameter_deviation = 0.2;  ///< standard deviation before anything was learnt, relative
+  double parameter_drift_per_sqrt_s = 5e-4;  ///< random walk of the parameters, relative
+  /// Random walk of the disturbance, relative to the torque that bends a segment by 1 rad; the
+  /// least, and the most that it grows to by itself while the disturbance is seen to move.
+  double disturbance_drift_per_sqrt_s = 3e-3;
+  double largest_disturbance_drift_per_sqrt_s = 0.045;
+};
+
 /// From motion-capture frames to u: method, noise, and which frames are refused.
 struct EstimationSettings {
   CurvatureMethod method = CurvatureMethod::pose;
@@ -20,6 +37,8 @@ struct EstimationSettings {
   bool base_is_fixed = false;            ///< the base is where arm.base says, not a measured body
   double filter_bandwidth_radps = 30.0;  ///< of the filter on u and u'
   int predicted_frames = 3;              ///< frames an occluded segment may be predicted for
+  ObserverKind observer = ObserverKind::kinematic;
+  ModelObserverSettings model_observer;
 
   // A frame is rejected where it violates one of these.
   double quaternion_tolerance = 0.02;  ///< | |q| - 1 |
