@@ -84,6 +84,18 @@ void describe_actuation(Keys& key, ActuationSettings& it, Presence presence) {
   key.when(torque, [&] { describe_torque(key, it, torque_before); });
 }
 
+static void describe(Keys& key, ModelObserverSettings& it) {
+  KEY(learn_parameters,
+      "stiffness, damping, gain and a horizontal load of every segment, on line");
+  KEY(parameter_deviation, above(0, 1),
+      "standard deviation of the parameters before anything was learnt, relative");
+  KEY(parameter_drift_per_sqrt_s, from(0, 1), "random walk of the parameters, relative");
+  KEY(disturbance_drift_per_sqrt_s, above(0, 10),
+      "random walk of the disturbance over the torque that bends a segment by 1 rad, at least");
+  KEY(largest_disturbance_drift_per_sqrt_s, above(0, 10),
+      "the same, at most: it grows while the disturbance is seen to move");
+}
+
 static void describe(Keys& key, EstimationSettings& it) {
   KEY(method, one_of({"pose", "orientation", "printed"}),
       "pose: position and orientation; orientation: inertial sensors; printed: the paper's (20), "
@@ -92,6 +104,10 @@ static void describe(Keys& key, EstimationSettings& it) {
   KEY(orientation_noise_rad, above(0, 1), "the same, of its rotation vector");
   KEY(filter_bandwidth_radps, above(0, 1e5), "of the velocity filter on u");
   KEY(predicted_frames, from(0, 1000), "frames an occluded segment may be predicted for");
+  KEY(observer, one_of({"kinematic", "model"}),
+      "of u and u': kinematic (a filter on u alone) or model (a Kalman filter on (16), with a "
+      "disturbance and parameters)");
+  KEY(model_observer, "of observer: model");
   KEY(quaternion_tolerance, above(0, 1), "a frame with ||q| - 1| above it is rejected");
   KEY(length_tolerance, above(0, 100), "a frame with ||t| - chord| / L above it is rejected");
   KEY(max_speed_radps, above(0, kMany), "a frame in which u jumps faster is rejected");
@@ -121,6 +137,9 @@ static void describe(Keys& key, ControllerSettings& it) {
       "K_P: one for all, one a segment, or [x, y] a segment (polar: [phi, theta])", kRequired);
   key("kd_nms_per_rad", it.kd, from(0, 1e3).one_or_pairs(), "K_D, in the same forms");
   key("ki_nm_per_rad_s", it.ki, gains, "integral gain on u, in the same forms; not in the paper");
+  KEY(disturbance, one_of({"cancel", "model_only", "none"}),
+      "what the model observer found: cancel (parameters and disturbance), model_only (parameters; "
+      "the arm stays soft), none");
   KEY(valve_lag_s, from(0, 5), "first-order lag inverted on what depends on the reference alone");
   key("delay_s", it.dead_time_s, from(0, 5),
       "dead time of valves and tubes, for the check of gains at load time");

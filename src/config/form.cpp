@@ -21,6 +21,7 @@ constexpr std::array kUnits = std::to_array<std::pair<std::string_view, std::str
     {"_nm_per_s", "N m/s"},
     {"_bar_per_s", "bar/s"},
     {"_per_bar", "1/bar"},
+    {"_per_sqrt_s", "1/s^0.5"},
     {"_radps", "rad/s"},
     {"_mps2", "m/s^2"},
     {"_1ps", "1/s"},

@@ -34,6 +34,14 @@ struct TaskSpaceSettings {
   double posture_rate_1ps = 2.0;
 };
 
+/// What (17) makes of what the model-based observer found; nothing where there is none.
+enum class DisturbanceRejection {
+  cancel,      ///< corrected parameters, and the estimated disturbance is cancelled: no offset, and
+               ///< the arm gives way to nothing that lasts
+  model_only,  ///< corrected parameters: the arm stays as soft as K + K_P
+  none         ///< the configured model
+};
+
 /// The controller (17): its terms, gains and limits.
 struct ControllerSettings {
   ControlCoordinates coordinates = ControlCoordinates::u;
@@ -45,6 +53,7 @@ struct ControllerSettings {
   /// Diagonal of an integral gain on u_ref - u (N m/(rad s)), in u whatever the coordinates; not in
   /// the paper. Empty or zero: none, at no cost.
   std::vector<double> ki;
+  DisturbanceRejection disturbance = DisturbanceRejection::cancel;
   double valve_lag_s = 0.0;
   double dead_time_s = 0.0;
   double max_theta_rad = 2.5;

@@ -11,6 +11,21 @@ enum class CurvatureMethod {
   printed       ///< the paper's (20) as printed, for comparison only
 };
 
+/// What u and u' at the tick come from.
+enum class ObserverKind {
+  kinematic,  ///< CurvatureFilter: a polynomial through the measurements, no model of the arm
+  model       ///< ModelObserver: a Kalman filter on (16) with disturbance and parameters
+};
+
+/// Of the model-based observer; physical quantities, none of which needs tuning for a usual arm.
+struct ModelObserverSettings {
+  bool learn_parameters = true;
+  double parameter_deviation = 0.2;
+  double parameter_drift_per_sqrt_s = 5e-4;
+  double disturbance_drift_per_sqrt_s = 3e-3;
+  double largest_disturbance_drift_per_sqrt_s = 0.045;
+};
+
 /// From motion-capture frames to u: method, noise, and which frames are refused.
 struct EstimationSettings {
   CurvatureMethod method = CurvatureMethod::pose;
@@ -19,6 +34,8 @@ struct EstimationSettings {
   bool base_is_fixed = false;  ///< the base is where arm.base says, not a measured body
   double filter_bandwidth_radps = 30.0;
   int predicted_frames = 3;
+  ObserverKind observer = ObserverKind::kinematic;
+  ModelObserverSettings model_observer;
 
   // A frame is rejected where it violates one of these.
   double quaternion_tolerance = 0.02;

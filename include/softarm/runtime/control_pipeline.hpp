@@ -8,6 +8,7 @@
 #include <array>
 #include <cstdint>
 #include <limits>
+#include <memory>
 #include <span>
 
 #include "softarm/actuation/pressure_allocator.hpp"
@@ -22,6 +23,8 @@
 #include "softarm/runtime/settings.hpp"
 
 namespace softarm {
+
+class ModelObserver;
 
 /// A live reference as it came over the wire: 2n numbers each; rad, rad/s, rad/s^2.
 struct LiveReferenceInput {
@@ -57,8 +60,14 @@ struct TickOutput {
   bool bounded = false;     ///< the controller bounded something near a singularity
   std::int64_t frame_number = -1;                                 ///< newest accepted frame
   double frame_age_s = std::numeric_limits<double>::quiet_NaN();  ///< now minus its capture
-  FilteredMotion motion;      ///< u and u' predicted to the middle of the period that begins now
-  ReferenceSample reference;  ///< at the same instant; empty unless ACTIVE
+  /// u and u' predicted to the middle of the period that begins now; of the model-based observer,
+  /// later by control.delay_s, when the command acts.
+  FilteredMotion motion;
+  /// In the middle of the period that begins now; empty unless ACTIVE.
+  ReferenceSample reference;
+  /// Correction of the model, its deviations and the innovations; null without a model-based
+  /// observer, and while it does not run and `motion` is the kinematic filter's.
+  const ModelObserver* observer = nullptr;
   SegmentVector tau_actuation_nm;  ///< (17); empty unless ACTIVE
   PressureVector pressure_bar;     ///< to be sent
 };
@@ -70,6 +79,7 @@ class ControlPipeline {
   /// @throws std::invalid_argument as the rooms it is made of, for settings that do not fit
   /// together
   explicit ControlPipeline(const PipelineSettings& settings);
+  ~ControlPipeline();
 
   const TickOutput& tick(const TickInput& input) noexcept;
 
@@ -88,10 +98,10 @@ class ControlPipeline {
   void validate_and_estimate(const TickInput& input, SafetyInput& safety) noexcept;
   void watch(const TickInput& input, SafetyInput& safety) noexcept;
   void use_frame(const MocapFrame& frame) noexcept;
-  void predict(std::int64_t at_ns) noexcept;
+  void predict(std::int64_t now_ns, std::int64_t at_ns) noexcept;
   void expect(std::int64_t at_ns) noexcept;
   void take_reference(const TickInput& input) noexcept;
-  void control() noexcept;
+  void control(std::int64_t act_ns) noexcept;
   void limit(Mode mode) noexcept;
   bool poses_frozen() const noexcept;
   bool beyond_soft_limit(bool speed_too) const noexcept;
@@ -102,6 +112,8 @@ class ControlPipeline {
   double period_s_;
   FrameValidator validator_;
   CurvatureFilter filter_;
+  std::unique_ptr<ModelObserver> observer_;  ///< where it is configured
+  std::int64_t delay_ns_;                    ///< that they and the controller look ahead by
   SafetyMonitor safety_;
   Reference reference_;
   CurvatureController controller_;
@@ -117,6 +129,7 @@ class ControlPipeline {
   Allocation allocation_;
   PressureVector previous_bar_;
   SegmentVector previous_tau_nm_;               ///< that these give
+  SegmentVector commanded_tau_nm_;              ///< scratch of what is sent now
   PressureVector pressure_at_last_motion_bar_;  ///< commanded when the poses last changed
   std::array<std::int64_t, kMaxSegments> seen_ns_{};
   std::int64_t epoch_ns_ = 0;

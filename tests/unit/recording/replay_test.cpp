@@ -123,6 +123,17 @@ TEST_F(LockStepReplay, TorquesAndShadowToo) {
   EXPECT_EQ(summary.commands.compared, run.ticks);
 }
 
+TEST_F(LockStepReplay, TheModelObserverToo) {
+  Experiment experiment = experiment_;
+  experiment.estimation.observer = ObserverKind::model;
+  LogBytes log;
+  const auto run = test::record_run(experiment, 5.0, false, log);
+  const ReplaySummary summary = replay(log.bytes, experiment).summary;
+  EXPECT_TRUE(summary.complete());
+  EXPECT_FALSE(summary.different());
+  EXPECT_EQ(summary.commands.compared, run.ticks);
+}
+
 TEST_F(LockStepReplay, AFlippedBitInACommandIsFoundAndNamed) {
   std::vector<std::size_t> ends;
   const auto commands = events_on(log_.bytes, experiment_.transport.lcm.command_channel, ends);

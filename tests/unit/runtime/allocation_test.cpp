@@ -17,8 +17,12 @@ TEST(PipelineAllocation, TenThousandTicksThroughAllModes) {
   Experiment experiment = test::paper_arm();
   experiment.reference.phases.insert(experiment.reference.phases.begin(),
                                      {LiveReference{.timeout_s = 0.2}, 1.0});
-  for (const ControlCoordinates coordinates : {ControlCoordinates::u, ControlCoordinates::polar}) {
+  using enum ControlCoordinates;
+  for (const auto& [coordinates, observer] : {std::pair(u, ObserverKind::kinematic),
+                                              {polar, ObserverKind::kinematic},
+                                              {u, ObserverKind::model}}) {
     experiment.control.coordinates = coordinates;
+    experiment.estimation.observer = observer;
     const auto bench = std::make_unique<PipelineBench>(experiment);
     LiveReferenceInput live;
     live.u = live.velocity = live.acceleration = SegmentVector::Zero(6);

@@ -8,6 +8,7 @@
 #include <cstring>
 #include <vector>
 
+#include "softarm/estimation/model_observer.hpp"
 #include "softarm/runtime/settings.hpp"
 #include "unit/runtime/pipeline_bench.hpp"
 
@@ -272,6 +273,37 @@ TEST_F(Pipeline, AfterVentTheReferenceIsJoinedFromWhereTheArmIs) {
   bench.publishing = true;
   ASSERT_GT(bench.run_to(Mode::active), 0);
   EXPECT_LT((bench.pipeline.output().reference.u - bench.u).norm(), 0.02);
+}
+
+TEST_F(Pipeline, WithTheModelObserverMotionIsItsOwn) {
+  Experiment modelled = experiment;
+  modelled.estimation.observer = ObserverKind::model;
+  PipelineBench observed(modelled);
+  ASSERT_GT(observed.run_to(Mode::active), 0);
+  observed.run(500);
+  const TickOutput& output = observed.pipeline.output();
+  ASSERT_NE(output.observer, nullptr);
+  EXPECT_TRUE(output.motion.all_valid());
+  // The ideal arm of this bench obeys no law of motion, so the observer finds a disturbance; it
+  // follows all the same.
+  EXPECT_LT((output.motion.u_rad - observed.u).norm(), 0.02);
+  EXPECT_TRUE(output.observer->correction().disturbance_nm.allFinite());
+}
+
+TEST_F(Pipeline, WhereTheModelCannotBeFactoredTheKinematicFilterServes) {
+  Experiment impossible = experiment;
+  impossible.estimation.observer = ObserverKind::model;
+  impossible.arm.segments[1].stiffness_nm_per_rad = -1e6;  // no arm: B + ... + g^2 h^2 K indefinite
+  PipelineBench broken(impossible);
+  ASSERT_GT(broken.run_to(Mode::active), 0);
+  int fell_back = 0;
+  for (int k = 0; k < 200; ++k) {
+    const TickOutput& output = broken.tick();
+    ASSERT_EQ(output.mode, Mode::active);
+    EXPECT_TRUE(output.motion.all_valid());
+    fell_back += output.observer == nullptr ? 1 : 0;
+  }
+  EXPECT_GT(fell_back, 50);
 }
 
 class LiveReferenceInPipeline : public Pipeline {
