@@ -85,8 +85,7 @@ void describe_actuation(Keys& key, ActuationSettings& it, Presence presence) {
 }
 
 static void describe(Keys& key, ModelObserverSettings& it) {
-  KEY(learn_parameters,
-      "stiffness, damping, gain and a horizontal load of every segment, on line");
+  KEY(learn_parameters, "stiffness, damping, gain and a horizontal load of every segment, on line");
   KEY(parameter_deviation, above(0, 1),
       "standard deviation of the parameters before anything was learnt, relative");
   KEY(parameter_drift_per_sqrt_s, from(0, 1), "random walk of the parameters, relative");

@@ -1,8 +1,9 @@
 // The table and the JSON of softarm-dev bench robustness.
 #include <fmt/format.h>
 
+#include <nlohmann/json.hpp>
+
 #include "dev/bench/robustness_scenes.hpp"
-#include "softarm/base/json_writer.hpp"
 
 namespace softarm {
 namespace {
@@ -45,47 +46,31 @@ std::string table(const std::vector<RobustnessRow>& rows, const std::vector<Obse
 }
 
 std::string json(const std::vector<RobustnessRow>& rows, const std::vector<ObserverCost>& costs) {
-  JsonWriter json;
-  json.open_object();
-  json.key("scenes");
-  json.open_array();
+  using Json = nlohmann::ordered_json;
+  Json scenes = Json::array(), observer_costs = Json::array();
   for (const RobustnessRow& row : rows) {
-    json.open_object();
-    json.member("scene", row.scene);
-    json.member("bound_mrad", row.bound_mrad);
-    json.key("laws");
-    json.open_array();
+    Json laws = Json::array();
     for (const RobustnessCell& cell : row.cells) {
       const RobustnessTrial& trial = cell.worst;
-      json.open_object();
-      json.member("law", name(cell.law));
-      json.member("u_rms_rad", trial.u_rms_rad);
-      json.member("u_largest_rad", trial.u_largest_rad);
-      json.member("tip_rms_m", trial.tip_rms_m);
-      json.member("pressure_rate_bar_per_s", trial.pressure_rate_bar_per_s);
-      json.member("tick_us", trial.tick_us);
-      json.member("frame_tick_us", trial.frame_tick_us);
-      json.member("nis", trial.nis);
-      json.member("surprised", trial.surprised);
-      json.member("stayed_active", trial.stayed_active);
-      json.close_object();
+      laws.push_back({{"law", name(cell.law)},
+                      {"u_rms_rad", trial.u_rms_rad},
+                      {"u_largest_rad", trial.u_largest_rad},
+                      {"tip_rms_m", trial.tip_rms_m},
+                      {"pressure_rate_bar_per_s", trial.pressure_rate_bar_per_s},
+                      {"tick_us", trial.tick_us},
+                      {"frame_tick_us", trial.frame_tick_us},
+                      {"nis", trial.nis},
+                      {"surprised", trial.surprised},
+                      {"stayed_active", trial.stayed_active}});
     }
-    json.close_array();
-    json.close_object();
+    scenes.push_back(
+        {{"scene", row.scene}, {"bound_mrad", row.bound_mrad}, {"laws", std::move(laws)}});
   }
-  json.close_array();
-  json.key("observer_costs");
-  json.open_array();
-  for (const ObserverCost& cost : costs) {
-    json.open_object();
-    json.member("segments", cost.segments);
-    json.member("tick_us", cost.tick_us);
-    json.member("frame_us", cost.frame_us);
-    json.close_object();
-  }
-  json.close_array();
-  json.close_object();
-  return json.text() + "\n";
+  for (const ObserverCost& cost : costs)
+    observer_costs.push_back(
+        {{"segments", cost.segments}, {"tick_us", cost.tick_us}, {"frame_us", cost.frame_us}});
+  const Json report{{"scenes", std::move(scenes)}, {"observer_costs", std::move(observer_costs)}};
+  return report.dump() + "\n";
 }
 
 }  // namespace softarm
