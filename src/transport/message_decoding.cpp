@@ -51,8 +51,8 @@ bool decode_exactly(std::span<const std::byte> bytes, std::size_t expected,
              static_cast<int>(bytes.size());
 }
 
-/// A message whose only length is a 16-bit number after `fixed` bytes, followed by that many elements
-/// of `element` bytes.
+/// A message whose only length is a 16-bit number after `fixed` bytes, followed by that many
+/// elements of `element` bytes.
 template <class Message>
 bool decode_list(std::span<const std::byte> bytes, std::size_t fixed, std::size_t element,
                  int limit, Message& message) noexcept {

@@ -18,8 +18,8 @@ inline constexpr int kDurationBuckets = 32;
 /// How many durations fell into each bucket.
 using DurationCounts = std::array<std::int64_t, kDurationBuckets>;
 
-/// Upper edge, in us, of the bucket below which `fraction` (0 to 1) of the durations lie; 0 if there
-/// are none.
+/// Upper edge, in us, of the bucket below which `fraction` (0 to 1) of the durations lie; 0 if
+/// there are none.
 inline double quantile_us(const DurationCounts& counts, double fraction) noexcept {
   std::int64_t total = 0;
   for (const auto count : counts) total += count;

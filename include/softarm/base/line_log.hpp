@@ -15,8 +15,9 @@
 
 namespace softarm {
 
-/// A bounded log for one writing thread. A line that does not fit is cut, and lines that come faster
-/// than they can be printed (kCapacity at once, 10 per second sustained) are counted, not queued.
+/// A bounded log for one writing thread. A line that does not fit is cut, and lines that come
+/// faster than they can be printed (kCapacity at once, 10 per second sustained) are counted, not
+/// queued.
 class LineLog {
  public:
   /// Lines that may wait to be printed.

@@ -1,4 +1,5 @@
-// Times as integer nanoseconds: conversion from and to seconds, and the times "never" and "forever".
+// Times as integer nanoseconds: conversion from and to seconds, and the times "never" and
+// "forever".
 #pragma once
 
 #include <cmath>

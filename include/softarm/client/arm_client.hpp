@@ -86,17 +86,18 @@ class ArmClient : public OperatorClient {
   const std::optional<ChamberCommand>& command() const;
   /// Sets the callback for every command.
   void on_command(std::function<void(const ChamberCommand&)> callback);
-  /// Which other program commands the arm, as a sentence for a person. Empty if there is none: within
-  /// the last second no command for the valves came from another program, and no daemon was armed.
+  /// Which other program commands the arm, as a sentence for a person. Empty if there is none:
+  /// within the last second no command for the valves came from another program, and no daemon was
+  /// armed.
   std::string other_commander() const;
 
   // References, for a softarmd whose phase is `live`.
 
   /// Sends a reference: u, u' and u'' with 2n numbers each, in rad, rad/s and rad/s^2, valid from
-  /// its arrival: the daemon extrapolates it for the timeout_s of the phase and then rests at u. The
-  /// daemon refuses a reference beyond control.max_theta_rad or max_speed_radps, or farther than
-  /// max_step_rad from its current one, and reports that as status()->reference_limited. Does not
-  /// block.
+  /// its arrival: the daemon extrapolates it for the timeout_s of the phase and then rests at u.
+  /// The daemon refuses a reference beyond control.max_theta_rad or max_speed_radps, or farther
+  /// than max_step_rad from its current one, and reports that as status()->reference_limited. Does
+  /// not block.
   /// @throws std::invalid_argument for a wrong size or a number that is not finite; TransportError
   void send_reference(ConstVectorRef u_rad, ConstVectorRef velocity_radps,
                       ConstVectorRef acceleration_radps2);
@@ -109,13 +110,13 @@ class ArmClient : public OperatorClient {
   /// @throws OtherInstance; std::logic_error where actuation is by torque, or if this client holds
   /// the lock already
   void lock_commands();
-  /// Moves every set point towards `wanted_bar` (one per chamber, bar), within the limits of pressure
-  /// and slew rate and at most at `rate_bar_per_s`, and sends the set points when they are due, 100
-  /// times a second. A pause is not caught up with. A command is valid for
-  /// daemon.lcm.command_validity_s: the valves vent by themselves when it expires, and set points then
-  /// begin at zero again. Does not block.
-  /// @throws std::logic_error without the lock; std::invalid_argument for a wrong size (a number that
-  /// is not finite leaves its chamber unchanged); TransportError
+  /// Moves every set point towards `wanted_bar` (one per chamber, bar), within the limits of
+  /// pressure and slew rate and at most at `rate_bar_per_s`, and sends the set points when they are
+  /// due, 100 times a second. A pause is not caught up with. A command is valid for
+  /// daemon.lcm.command_validity_s: the valves vent by themselves when it expires, and set points
+  /// then begin at zero again. Does not block.
+  /// @throws std::logic_error without the lock; std::invalid_argument for a wrong size (a number
+  /// that is not finite leaves its chamber unchanged); TransportError
   void command_chambers(const PressureVector& wanted_bar,
                         double rate_bar_per_s = std::numeric_limits<double>::infinity());
   /// As `command_chambers` towards 0 bar, at actuation.vent_bar_per_s.

@@ -44,18 +44,18 @@ struct ArmMessage {
   std::int64_t wall_us;     ///< the arrival on the wall clock
 };
 
-/// Status of the daemon, and requests to it. Use from one thread. Messages are handled, and callbacks
-/// called, only in `update`, `wait_for`, `wait_for_status` and `request`. A callback may throw; its
-/// exception leaves that function. There is one callback of each kind: setting another replaces it.
-/// Times are ns of CLOCK_MONOTONIC unless a clock was given.
+/// Status of the daemon, and requests to it. Use from one thread. Messages are handled, and
+/// callbacks called, only in `update`, `wait_for`, `wait_for_status` and `request`. A callback may
+/// throw; its exception leaves that function. There is one callback of each kind: setting another
+/// replaces it. Times are ns of CLOCK_MONOTONIC unless a clock was given.
 class OperatorClient {
  public:
   /// Returns the current time in ns.
   using Clock = std::function<std::int64_t()>;
 
   /// @param lcm  network and channels of the arm
-  /// @param clock  the current time in ns, not decreasing: for tests. Functions that wait for a time
-  /// of this clock (`update`, `vent_to_rest`) need it to advance.
+  /// @param clock  the current time in ns, not decreasing: for tests. Functions that wait for a
+  /// time of this clock (`update`, `vent_to_rest`) need it to advance.
   /// @throws TransportError
   explicit OperatorClient(const LcmSettings& lcm, Clock clock = monotonic_now_ns)
       : OperatorClient(lcm, 0, std::move(clock)) {}
@@ -66,8 +66,8 @@ class OperatorClient {
   /// The current time of the client's clock, in ns.
   std::int64_t now_ns() const { return clock_(); }
 
-  /// Waits for a message until `until_ns`, then handles it and all others that have arrived. Returns
-  /// false if none came, or if a signal interrupted the wait. @throws what callbacks throw
+  /// Waits for a message until `until_ns`, then handles it and all others that have arrived.
+  /// Returns false if none came, or if a signal interrupted the wait. @throws what callbacks throw
   bool update(std::int64_t until_ns);
   /// Handles messages one by one until `reached()` is true, which is evaluated after each, or until
   /// `patience_s` of the real clock have passed. Returns whether it was reached.
@@ -84,8 +84,8 @@ class OperatorClient {
   bool daemon_armed() const;
   /// Mode and reason of the newest status, such as "ACTIVE (none)", or "not heard".
   std::string daemon_text() const;
-  /// Sets the callback for every status, including those of a shadow; it is called before the status
-  /// becomes `status()`.
+  /// Sets the callback for every status, including those of a shadow; it is called before the
+  /// status becomes `status()`.
   void on_status(std::function<void(const ArmStatus&)> callback) { on_status_ = callback; }
   /// Sets the callback for every message of the channels listened to (the status, those named to
   /// `listen`, and those of ArmClient); it is called before the message is decoded.
@@ -97,7 +97,8 @@ class OperatorClient {
   /// Sends one request and does not wait. @throws TransportError if it could not be sent
   void send(OperatorRequest what);
   /// Sends requests 20 times a second until a status received after the first request shows the
-  /// result, or until `patience_s` have passed. Blocks. @throws TransportError if none could be sent
+  /// result, or until `patience_s` have passed. Blocks. @throws TransportError if none could be
+  /// sent
   RequestOutcome request(OperatorRequest what, double patience_s = 2.0);
   /// Sends the dead-man input: "go" (true) holds for safety.deadman_timeout_s from its arrival, or
   /// until it is withdrawn (false). @throws TransportError; std::logic_error where
@@ -105,9 +106,9 @@ class OperatorClient {
   void send_go(bool go);
 
   /// From now on writes every message of the channels that LcmSettings names (ArmClient: also those
-  /// of motion capture) to an LCM event log, which EventLogReader, `softarm report`, `softarm replay`
-  /// and lcm-logplayer read. A later write failure (a full disk) throws std::runtime_error from the
-  /// function that handles messages. @throws std::runtime_error, TransportError
+  /// of motion capture) to an LCM event log, which EventLogReader, `softarm report`, `softarm
+  /// replay` and lcm-logplayer read. A later write failure (a full disk) throws std::runtime_error
+  /// from the function that handles messages. @throws std::runtime_error, TransportError
   void record(const std::filesystem::path& log);
   /// Ends the recording; the file is complete afterwards. @throws std::runtime_error
   void stop_recording();

@@ -10,8 +10,8 @@
 
 namespace softarm {
 
-/// State and counters of the driver of a valve terminal (valves_status_t): why pressures are not what
-/// was commanded.
+/// State and counters of the driver of a valve terminal (valves_status_t): why pressures are not
+/// what was commanded.
 struct ValvesStatus {
   std::int64_t time_us = 0;    ///< the driver's monotonic clock
   std::int64_t sequence = -1;  ///< of the command whose set points were written; -1: none

@@ -59,7 +59,8 @@ struct ArmStatus {
   std::string text() const;
 };
 
-/// True state of a simulated arm (plant_state_t), which no sensor of a real arm measures completely.
+/// True state of a simulated arm (plant_state_t), which no sensor of a real arm measures
+/// completely.
 struct PlantState {
   std::int64_t time_us = 0;             ///< monotonic clock of the simulator
   bool vented = false;                  ///< no command is valid: all valves are at zero

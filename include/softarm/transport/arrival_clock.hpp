@@ -11,8 +11,8 @@ namespace softarm {
 /// monotonic clock. The difference of the clocks is updated by every `look`. If the wall clock was
 /// set between two looks, a stamp may belong to the clock before or after; of the possible arrivals
 /// the later one counts. So setting the clock never makes a packet appear older than it is, and
-/// younger by no more than the time from its arrival to the look. Allocates nothing, throws nothing,
-/// reads no clock.
+/// younger by no more than the time from its arrival to the look. Allocates nothing, throws
+/// nothing, reads no clock.
 class ArrivalClock {
  public:
   /// Longest time that a packet may have waited in the kernel or in LCM's queue before the previous
@@ -26,8 +26,8 @@ class ArrivalClock {
   /// `monotonic_ns`.
   void look(std::int64_t monotonic_ns, std::int64_t wall_ns) noexcept;
 
-  /// Arrival of a packet stamped `stamp_us`, in ns of the monotonic clock. Call in order of arrival;
-  /// the results do not decrease. For an impossible stamp it is the time of the look.
+  /// Arrival of a packet stamped `stamp_us`, in ns of the monotonic clock. Call in order of
+  /// arrival; the results do not decrease. For an impossible stamp it is the time of the look.
   std::int64_t arrival_ns(std::int64_t stamp_us) noexcept;
 
  private:

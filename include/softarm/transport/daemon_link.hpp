@@ -57,8 +57,8 @@ class DaemonLink {
   /// Publishes the inputs of the tick of the last command, and again the record of
   /// TickRecorder::kRepeatAfter ticks ago. Does nothing if no channel is configured for it.
   void publish_record(const TickInput& input, const TickOutput& output) noexcept;
-  /// Repeats the oldest record that has been sent only once; false if there is none. For the end of a
-  /// run, when no tick follows.
+  /// Repeats the oldest record that has been sent only once; false if there is none. For the end of
+  /// a run, when no tick follows.
   bool repeat_record() noexcept;
 
   /// Messages that could not be decoded.

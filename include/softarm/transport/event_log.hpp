@@ -41,9 +41,9 @@ struct LogDamage {
 };
 
 /// Reads a log event by event. An event is accepted if its sizes lead to the sync word of the next
-/// event or to the end of the log, or, where damage follows, if no other sync word begins within it.
-/// After damage, reading continues at the next sync word that begins an event. Reads forward only;
-/// holds one event and a block of 64 KiB, whatever sizes the bytes claim.
+/// event or to the end of the log, or, where damage follows, if no other sync word begins within
+/// it. After damage, reading continues at the next sync word that begins an event. Reads forward
+/// only; holds one event and a block of 64 KiB, whatever sizes the bytes claim.
 class EventLogReader {
  public:
   static constexpr std::size_t kLargestChannel = 63;    ///< bytes; the limit of LCM
@@ -99,7 +99,8 @@ class EventLogWriter {
   /// @param time_us  arrival on the wall clock, as in the logs of lcm-logger
   /// @param channel  1 to EventLogReader::kLargestChannel bytes
   /// @param data  up to EventLogReader::kLargestData bytes
-  /// @throws std::invalid_argument for other sizes; std::runtime_error if the file could not be written
+  /// @throws std::invalid_argument for other sizes; std::runtime_error if the file could not be
+  /// written
   void write(std::int64_t time_us, std::string_view channel, std::span<const std::byte> data);
 
   /// Ends the log; the file is complete afterwards. @throws std::runtime_error if it is not

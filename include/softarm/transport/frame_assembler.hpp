@@ -9,11 +9,11 @@
 namespace softarm {
 
 /// Bodies whose stamps are less than half a frame period from that of the first one belong to one
-/// frame. A frame is complete when all bodies have arrived; it is also closed when a body of a later
-/// frame arrives, or half a frame period after its first body arrived: missing bodies then count as
-/// not seen. Bodies of a closed or older frame are dropped. Twice as many dropped bodies in a row as
-/// a frame has mean that the sender's clock was set back: assembly then starts again. Frames are
-/// numbered from 1, because the sender does not number them. Allocates nothing.
+/// frame. A frame is complete when all bodies have arrived; it is also closed when a body of a
+/// later frame arrives, or half a frame period after its first body arrived: missing bodies then
+/// count as not seen. Bodies of a closed or older frame are dropped. Twice as many older bodies
+/// in a row as a frame has mean that the sender's clock was set back: assembly then starts again.
+/// Frames are numbered from 1, because the sender does not number them. Allocates nothing.
 class FrameAssembler {
  public:
   /// What `add` did with a body: it joined the current frame, began a new one, or was dropped.
@@ -36,7 +36,8 @@ class FrameAssembler {
   /// unchanged. False if no frame is closed.
   bool take_done(MocapFrame& frame) noexcept;
 
-  /// Closes the current frame if its first body arrived at least half a frame period before `now_ns`.
+  /// Closes the current frame if its first body arrived at least half a frame period before
+  /// `now_ns`.
   void look_at_clock(std::int64_t now_ns) noexcept;
 
  private:

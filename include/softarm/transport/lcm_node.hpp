@@ -29,8 +29,8 @@ struct ReceivedMessage {
   std::int64_t stamp_us;    ///< the arrival as LCM stamped it, on the wall clock
 };
 
-/// An LCM handle for one thread. It uses the C interface of LCM, because the C++ interface allocates
-/// for every message.
+/// An LCM handle for one thread. It uses the C interface of LCM, because the C++ interface
+/// allocates for every message.
 class LcmNode {
  public:
   /// Called with every message of a channel; must not throw.

@@ -1,5 +1,5 @@
-// Decodes messages from the network. LCM's generated decoders trust the lengths they read and accept
-// trailing bytes, so every size is checked here before they run.
+// Decodes messages from the network. LCM's generated decoders trust the lengths they read and
+// accept trailing bytes, so every size is checked here before they run.
 #pragma once
 
 #include <cstddef>
@@ -20,12 +20,10 @@
 
 namespace softarm {
 
-/// @name Decoding
-/// Each returns false, and leaves `message` unspecified, unless `bytes` are exactly what the encoder
-/// of its type writes: the right hash, lengths within the capacities of this project, terminated
-/// texts, no byte missing or left over. Values are not checked. Allocates nothing once `message` has
-/// held one of the same size.
-/// @{
+/// @name Decoding Each returns false, and leaves `message` unspecified, unless `bytes` are exactly
+/// what the encoder of its type writes: the right hash, lengths within the capacities of this
+/// project, terminated texts, no byte missing or left over. Values are not checked. Allocates
+/// nothing once `message` has held one of the same size. @{
 bool decode(std::span<const std::byte> bytes, softarm_messages::mocap_frame_t& message) noexcept;
 bool decode(std::span<const std::byte> bytes,
             softarm_messages::pressure_command_t& message) noexcept;

@@ -32,8 +32,8 @@ class OutputMessages {
   /// Fills the command: pressures, or torques where actuation is by torque. The sender fills
   /// `time_us`.
   void set_command(std::int64_t tick, const TickOutput& output) noexcept;
-  /// Fills the status except `time_us`, `overruns` and `messages_malformed`, which the pipeline does
-  /// not know. The command of the same tick must have been set.
+  /// Fills the status except `time_us`, `overruns` and `messages_malformed`, which the pipeline
+  /// does not know. The command of the same tick must have been set.
   void set_status(std::int64_t tick, const ControlPipeline& pipeline) noexcept;
 
   /// Whether commands are torques: another type, which no valve terminal decodes.

@@ -1,5 +1,5 @@
-// Settings of the transport: LCM's network and channels, and the meaning of motion-capture messages.
-// config/template.yaml documents every setting.
+// Settings of the transport: LCM's network and channels, and the meaning of motion-capture
+// messages. config/template.yaml documents every setting.
 #pragma once
 
 #include <Eigen/Core>
@@ -46,7 +46,8 @@ struct MocapSourceSettings {
   Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();
 };
 
-/// A marker frame: the pose of the segment frame S_i in the frame of the rigid body that is tracked.
+/// A marker frame: the pose of the segment frame S_i in the frame of the rigid body that is
+/// tracked.
 struct PlateSettings {
   std::string name;
   Eigen::Vector3d position_m = Eigen::Vector3d::Zero();

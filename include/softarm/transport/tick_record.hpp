@@ -35,9 +35,9 @@ class RecordedInput {
   PressureVector measured_bar_;
 };
 
-/// Encodes the records of consecutive ticks and keeps each to be sent again kRepeatAfter ticks later:
-/// a logger that is held up for a moment loses what arrives just then, and without its record a tick
-/// cannot be replayed. After construction nothing allocates.
+/// Encodes the records of consecutive ticks and keeps each to be sent again kRepeatAfter ticks
+/// later: a logger that is held up for a moment loses what arrives just then, and without its
+/// record a tick cannot be replayed. After construction nothing allocates.
 class TickRecorder {
  public:
   static constexpr int kRepeatAfter = 50;  ///< ticks
@@ -46,8 +46,8 @@ class TickRecorder {
   /// Allocates for the largest record of the arm of `settings`. @param shadow  mark records as such
   TickRecorder(const PipelineSettings& settings, const Provenance& provenance, bool shadow);
 
-  /// Encoded record of a tick; valid until the next call. If full(), call take_oldest() first. Ticks
-  /// are counted from 1. Empty if the record did not fit.
+  /// Encoded record of a tick; valid until the next call. If full(), call take_oldest() first.
+  /// Ticks are counted from 1. Empty if the record did not fit.
   std::span<const std::byte> record(std::int64_t tick, const TickInput& input,
                                     const PressureVector& command) noexcept;
 

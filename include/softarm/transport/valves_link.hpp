@@ -28,8 +28,8 @@ class ValvesLink {
 
   /// Publishes the pressures that the driver has just read back.
   void publish_measurement(std::int64_t now_ns) noexcept;
-  /// Publishes state and counters when state, reason or chamber have changed, and ten times a second.
-  /// Returns whether they have changed.
+  /// Publishes state and counters when state, reason or chamber have changed, and ten times a
+  /// second. Returns whether they have changed.
   bool publish_status(std::int64_t now_ns, std::int64_t late_cycles) noexcept;
 
   /// Commands that were malformed or for another arm.

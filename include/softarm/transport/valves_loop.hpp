@@ -22,8 +22,9 @@ class ValvesLoop {
   /// @param driver  must outlive this  @throws TransportError
   ValvesLoop(const LcmSettings& lcm, double rate_hz, ValveDriver& driver);
 
-  /// Cycles until `stop_requested` returns true and zero pressure is confirmed or cannot be; returns
-  /// whether it was confirmed. Neither allocates nor throws as long as the callbacks do not.
+  /// Cycles until `stop_requested` returns true and zero pressure is confirmed or cannot be;
+  /// returns whether it was confirmed. Neither allocates nor throws as long as the callbacks do
+  /// not.
   bool run(const std::function<bool()>& stop_requested,
            const std::function<void(const Report&)>& after_cycle);
 
