@@ -16,7 +16,7 @@ namespace {
 
 constexpr std::size_t kLongest = sizeof sockaddr_un{}.sun_path - 1;
 
-/// Of a name too long for a socket, its beginning and the hash of the whole.
+/// The name itself, or, where it is too long for a socket, its beginning and the hash of the whole.
 std::string fitting(const std::string& name) {
   if (name.size() <= kLongest) return name;
   const std::string hash = fmt::format("#{:016x}", fnv1a(name));

@@ -15,7 +15,7 @@ LineLog::LineLog(std::string program, std::function<void(const std::string&)> pr
       thread_([this](const std::stop_token& stop) { print_until(stop); }) {}
 
 void LineLog::print_until(const std::stop_token& stop) {
-  // One more line may be printed every pause; those that nobody needed are saved up.
+  // Every pause permits one more line; unused permits accumulate.
   for (std::size_t allowed = kCapacity;; allowed = std::min(kCapacity, allowed + 1)) {
     const bool last = stop.stop_requested();
     for (std::size_t tail = tail_.load();

@@ -28,7 +28,7 @@ std::vector<double> checked(ConstVectorRef numbers, int expected, const char* wh
 
 }  // namespace
 
-/// All that is heard, and the commander once there is one.
+/// Everything received, and the commands once the lock is taken.
 struct ArmClient::State {
   explicit State(Experiment from)
       : experiment(std::move(from)),
@@ -72,7 +72,7 @@ struct ArmClient::State {
   }
 
   CommandRamp& commander() {
-    if (!ramp) throw std::logic_error("commanding chambers: expected lock_commands() before");
+    if (!ramp) throw std::logic_error("commanding chambers: call lock_commands() first");
     return *ramp;
   }
 
@@ -113,7 +113,7 @@ ArmClient::ArmClient(const std::filesystem::path& experiment)
     : ArmClient(load_experiment(experiment)) {}
 
 ArmClient::~ArmClient() {
-  // What they refer to may be gone.
+  // The objects that they refer to may no longer exist.
   on_message({});
   on_status({});
   on_frame({});
@@ -122,7 +122,7 @@ ArmClient::~ArmClient() {
   on_command({});
   try {
     if (state_->ramp && !state_->ramp->set_points_bar().isZero(0.0)) vent_to_rest();
-  } catch (...) {  // where nothing can be sent any more the command expires
+  } catch (...) {  // if nothing can be sent any more, the command expires
   }
 }
 
@@ -155,7 +155,7 @@ void ArmClient::on_command(std::function<void(const ChamberCommand&)> callback) 
 std::string ArmClient::other_commander() const {
   const std::int64_t heard_ns = state_->others_command_ns;
   if ((heard_ns == kNever || now_ns() - heard_ns > kCommandCounts_ns) && !daemon_armed()) return {};
-  return fmt::format("somebody commands pressures on {} (softarmd: {}); end it first",
+  return fmt::format("another program commands pressures on {} (softarmd: {}); end it first",
                      experiment().transport.lcm.command_channel, daemon_text());
 }
 

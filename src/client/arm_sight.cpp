@@ -5,7 +5,8 @@
 namespace softarm {
 namespace {
 
-constexpr std::int64_t kSpeedSpan_ns = 50'000'000;  ///< so far apart, noise is no speed
+constexpr std::int64_t kSpeedSpan_ns =
+    50'000'000;  ///< long enough that noise does not read as speed
 
 double largest_norm(const SegmentVector& pairs) {
   double largest = 0.0;
@@ -40,7 +41,7 @@ void ArmSight::take(const MocapFrame& frame, std::int64_t arrival_ns) {
 
 double ArmSight::speed_radps() const {
   const double span_s = to_seconds(recent_.back().arrival_ns - recent_.front().arrival_ns);
-  // Frames that a stall delivers all at once are no motion.
+  // Frames delivered all at once after a stall are not motion.
   if (span_s <= to_seconds(kSpeedSpan_ns) / 2.0) return 0.0;
   return largest_norm(recent_.back().u_rad - recent_.front().u_rad) / span_s;
 }

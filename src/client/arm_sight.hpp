@@ -1,4 +1,4 @@
-// The arm as motion capture shows it: frames to curvature, bend and speed.
+// The arm as motion capture shows it: from frames to curvature, bend and speed.
 #pragma once
 
 #include <cstdint>
@@ -9,11 +9,12 @@
 
 namespace softarm {
 
+/// Keeps the newest frame that showed every segment as a SeenArm.
 class ArmSight {
  public:
   explicit ArmSight(const Experiment& experiment);
 
-  /// A frame; one that repeats the last, or comes from before it, shows nothing.
+  /// Takes a frame; one that repeats the last, or is older, is ignored.
   void take(const MocapFrame& frame, std::int64_t arrival_ns);
   const SeenArm& seen() const { return seen_; }
 

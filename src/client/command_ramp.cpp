@@ -17,7 +17,7 @@ CommandRamp::CommandRamp(const ActuationSettings& actuation, double validity_s)
       vent_ramps_(actuation),
       bar_(PressureVector::Zero(chamber_count(actuation))),
       period_ns_(std::min(kPeriod_ns, to_ns(0.25 * validity_s))) {
-  actuation_.segments.clear();  // limits are all that is asked for from here on
+  actuation_.segments.clear();  // only the limits are needed from here on
   message_.validity_us = static_cast<std::int32_t>(std::llround(1e6 * validity_s));
   message_.shadow = 0;
   message_.num_chambers = static_cast<std::int16_t>(bar_.size());
@@ -34,7 +34,7 @@ void CommandRamp::approach(const PressureVector& wanted_bar, double rate_bar_per
 
 void CommandRamp::vent(std::int64_t now_ns) { vent_ramps_.vent(bar_, step_s(now_ns), bar_); }
 
-// No step makes up for a stall.
+// A stall is not caught up with.
 double CommandRamp::step_s(std::int64_t now_ns) {
   const std::int64_t passed_ns = std::clamp<std::int64_t>(now_ns - updated_ns_, 0, period_ns_);
   updated_ns_ = now_ns;

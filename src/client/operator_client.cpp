@@ -10,9 +10,9 @@
 namespace softarm {
 namespace {
 
-constexpr int kQueue = 1024;                       ///< messages of a channel, between two rounds
-constexpr std::int64_t kLook_ns = 10'000'000;      ///< a wait is as long as this at most
-constexpr std::int64_t kAskAgain_ns = 50'000'000;  ///< from a request to the next
+constexpr int kQueue = 1024;                       ///< messages of a channel between two rounds
+constexpr std::int64_t kLook_ns = 10'000'000;      ///< longest single wait
+constexpr std::int64_t kAskAgain_ns = 50'000'000;  ///< from one request to the next
 constexpr std::int64_t kStatusCounts_ns = 1'000'000'000;
 
 bool shows(const ArmStatus& status, OperatorRequest what) {
@@ -66,7 +66,7 @@ bool OperatorClient::handle_until(std::int64_t end_ns, int most) {
 }
 
 void OperatorClient::handle_round() {
-  // Arrivals as our clock shows them: it is another one than the node's in tests.
+  // Converts arrivals to our clock, which in tests is not that of the node.
   const std::int64_t monotonic_ns = monotonic_now_ns(), now_ns = this->now_ns();
   while (!received_.empty()) {
     const Received packet = std::move(received_.front());
@@ -127,7 +127,7 @@ void OperatorClient::send(OperatorRequest what) {
 }
 
 RequestOutcome OperatorClient::request(OperatorRequest what, double patience_s) {
-  update(now_ns());  // what came before is no answer
+  update(now_ns());  // what came before is not an answer
   const std::int64_t before = statuses_;
   std::int64_t next_ns = 0;
   bool sent = false;

@@ -32,7 +32,7 @@ bool LoggedRun::read_frame() {
       ++malformed_;
       continue;
     }
-    // A log written from several sources may step back a little; time here does not.
+    // The times of a log from several sources may step back a little; our time does not.
     next_arrival_ns_ = std::max(next_arrival_ns_, *arrival_ns);
     const MocapReceipt receipt = mocap_.take(*channel, event.data, next_arrival_ns_, next_);
     if (receipt == MocapReceipt::malformed) ++malformed_;
@@ -52,7 +52,7 @@ bool LoggedRun::step(LogRow& row, bool logged) {
   TickInput input;
   input.now_ns = now_ns;
   input.frames = frames_;
-  input.newest_measurement_ns = now_ns;  // of valves that are not there
+  input.newest_measurement_ns = now_ns;  // as if valves were present
   operator_.attend(pipeline_.output(), input);
   const std::int64_t before_ns = monotonic_now_ns();
   pipeline_.tick(input);

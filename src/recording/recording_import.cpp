@@ -30,8 +30,8 @@ Eigen::Matrix3d to_z_up(UpAxis up) {
   return rotation;
 }
 
-/// One row's body as it stands in the table; not valid where it was not seen: all zero, or no
-/// number. The norm is kept: whether a quaternion is believed is for the validator to say.
+/// The body of one row as given in the table; not valid where it was not seen (all zero, or not a
+/// number). The norm of the quaternion is kept: the validator decides whether to accept it.
 BodyPose body_in(const CsvTable& table, std::size_t row, const BodyColumns& body) {
   BodyPose pose;
   for (std::size_t i = 0; i < 3; ++i)
@@ -87,7 +87,7 @@ class Importer {
     for (std::size_t row = 0; row < table_.rows(); ++row) {
       const double t = time_s(row);
       const bool advances = row == 0 || t > time_s(row - 1);
-      // LCM's logs begin at 0 and the daemon's clocks know 64-bit nanoseconds.
+      // LCM logs begin at 0, and the daemon's clocks are 64-bit nanoseconds.
       if (!(t >= 0.0 && t < 4e9) || !advances) {
         throw std::runtime_error(
             fmt::format("{}:{}: {}: expected a time in [0, 4e9) s after that of "
@@ -106,7 +106,7 @@ class Importer {
     return convention_[body].to_world(body_in(table_, row, map_.bodies[body]));
   }
 
-  /// Rows in the window of rest in which every body was seen, those that repeat a frame left out.
+  /// Rows of the rest window in which every body was seen, without those that repeat a frame.
   std::vector<std::size_t> rest_rows() const {
     std::vector<std::size_t> rows;
     for (std::size_t row = 0; row < table_.rows(); ++row) {
@@ -126,7 +126,7 @@ class Importer {
     return rows;
   }
 
-  /// Where the frames of an arm that hangs straight at rest sit on the bodies.
+  /// The segment frames of an arm that hangs straight at rest, relative to the bodies.
   void learn_rest() {
     const std::vector<std::size_t> rows = rest_rows();
     summary_.rest_frames = static_cast<std::int64_t>(rows.size());

@@ -13,10 +13,11 @@ namespace softarm {
 namespace {
 
 constexpr auto kRequired = Presence::required;
-/// Of columns. A function: a map may be read before the variables of this file are there.
+/// The form of column names. A function, because a map may be read before the variables of this
+/// file are initialised.
 Form names() { return from(1, 2000); }
 
-/// The map as it is written: names where RecordingMap has columns.
+/// The map as it is written in YAML: column names where RecordingMap has indices.
 struct NamedBody {
   int id = 0;
   std::string position, orientation;
@@ -85,7 +86,7 @@ void describe_map(Keys& key, NamedMap& it, RecordingMap& map) {
   key.section({"channels", "of the log"}, [&] { describe_channels(key, map); });
 }
 
-/// Turns names into columns of the table, or says which name of the map is not there.
+/// Converts names to columns of the table; reports a name in the map that the table does not have.
 class ColumnFinder {
  public:
   ColumnFinder(const Keys& reader, const CsvTable& table) : reader_(reader), table_(table) {}

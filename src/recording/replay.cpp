@@ -38,7 +38,7 @@ void Replay::take(const LogEvent& event) {
   }
 }
 
-/// Commands and statuses wait for the record of their tick, which follows them.
+/// Commands and statuses wait for the record of their tick, which is sent after them.
 template <class Kind, class Tick>
 void Replay::keep(const LogEvent& event, Window<Kind>& window, Kind& incoming, Tick tick_of) {
   if (!decode(event.data, incoming.message)) {
@@ -62,7 +62,7 @@ void Replay::take_record(const LogEvent& event) {
     begin_run(record);
   }
   if (!record.build.empty()) check_build(record.build);
-  if (record.tick < next_) return;  // replayed already: its repetition
+  if (record.tick < next_) return;  // a repetition of a tick already replayed
   incoming.tick = record.tick;
   incoming.position = event.position;
   if (record.tick - next_ >= static_cast<std::int64_t>(kWindow)) {
@@ -75,7 +75,7 @@ void Replay::take_record(const LogEvent& event) {
   advance(kPatience);
 }
 
-/// Of an arm like ours, and with times that can be added and subtracted.
+/// Whether the record fits our arm and its times are small enough to calculate with.
 bool Replay::fits(const tick_record_t& record) const {
   constexpr std::int64_t kMost = 4'000'000'000'000'000'000;
   const auto sane = [](std::int64_t number) { return number >= 0 && number < kMost; };
@@ -98,7 +98,7 @@ void Replay::begin_run(const tick_record_t& first) {
         "the log was recorded with configuration {}, this one is {}; --any-configuration replays "
         "all the same",
         hash_text(recorded), hash_text(experiment_.hash)));
-  // What waits from an earlier run, which the same clock tells from this one.
+  // Discards messages that wait from an earlier run: the clock shows that they precede this run.
   const auto forget = [&first](auto& window) {
     for (auto& each : window)
       if (each.message.time_us < first.first_ns / 1000) each.tick = 0;
@@ -125,7 +125,8 @@ void Replay::end_run() {
 
 void Replay::finish() { end_run(); }
 
-/// Replays what can be, in order. A tick that is `patience` ticks behind the newest will not come.
+/// Replays all ticks that are available, in order. A tick that is `patience` ticks behind the
+/// newest is missing.
 void Replay::advance(std::int64_t patience) {
   while (next_ <= newest_) {
     WaitingRecord& waiting = place(*records_, next_);

@@ -16,7 +16,7 @@ namespace {
 constexpr double kPeriod_s = 0.02;
 constexpr int kPointsOfAnArc = 6;
 
-/// Lengths of the arcs that the plant consists of.
+/// Lengths in m of the arcs that make up the plant.
 std::vector<double> arc_lengths(const PlantSettings& plant) {
   std::vector<double> lengths;
   for (const SegmentParameters& segment : plant.arm.segments) {

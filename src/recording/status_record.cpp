@@ -13,8 +13,8 @@
 namespace softarm {
 namespace {
 
-constexpr std::int64_t kTruthPatience_us =
-    100'000;  ///< how long a row waits for the plant's word on it
+/// How long a row waits for the true state from the plant.
+constexpr std::int64_t kTruthPatience_us = 100'000;
 
 }  // namespace
 
@@ -28,8 +28,8 @@ void TruthTrack::fill(std::int64_t time_us, LogRow& row) const {
   const auto span =
       static_cast<double>(std::max<std::int64_t>(1, after_->time_us - before_->time_us));
   const double s = static_cast<double>(time_us - before_->time_us) / span;
-  // Cubic through both ends with the velocities told there: exact to h^4/384 of the fourth
-  // derivative.
+  // Cubic Hermite interpolation of the states and velocities at both ends: the error is at most
+  // h^4/384 times the fourth derivative.
   const double h = 1e-6 * span;
   row.truth = (1 + 2 * s) * (1 - s) * (1 - s) * before_->u_rad +
               h * s * (1 - s) * (1 - s) * before_->velocity_radps +
@@ -67,12 +67,11 @@ bool StatusRecord::take_status(std::span<const std::byte> bytes) {
   if (!decode(bytes, newest) || newest.segments() != experiment_.arm.size() ||
       !is_time_us(newest.time_us))
     return false;
-  // A shadow may be watched alone; beside the daemon that moves the arm it is not what is asked
-  // for.
+  // A shadow may be recorded alone, but not beside the daemon that moves the arm.
   if (newest.shadow && commander_heard_) return false;
   commander_heard_ = !newest.shadow;
   status_ = std::move(newest);
-  // The reference in a status belongs to the middle of the period that begins with its tick.
+  // The reference in a status is that of the middle of the period that begins with its tick.
   const double period_s = 1.0 / experiment_.rate_hz;
   const std::int64_t time_us = status_.time_us + static_cast<std::int64_t>(0.5e6 * period_s);
   if (rows_++ == 0) start_us_ = time_us;
@@ -101,7 +100,7 @@ void StatusRecord::write_rows(bool all) {
   const std::int64_t newest_us = waiting_.empty() ? 0 : waiting_.back().time_us;
   while (!waiting_.empty()) {
     WaitingRow& next = waiting_.front();
-    // A clock that has gone back is another daemon's, and what it waits for is past.
+    // A clock that has gone back is that of another daemon: the true state will not come.
     const std::int64_t waited_us = newest_us - next.time_us;
     const bool patient = waited_us >= 0 && waited_us < kTruthPatience_us;
     if (!all && patient && !truth_.reaches(next.time_us)) return;

@@ -12,10 +12,11 @@
 namespace softarm {
 namespace {
 
-/// What may arrive between two ticks; more is dropped by LCM and counted as missing.
+/// Frames accepted between two ticks; LCM drops more, which then count as missing.
 constexpr int kFrameCapacity = TickRecorder::kMostFrames;
 constexpr int kOtherCapacity = 16;
-/// After so long a silence a sender of references or requests may begin its numbers anew.
+/// After a silence of this length a sender of references or requests may restart its sequence
+/// numbers.
 constexpr std::int64_t kNumberForgotten_ns = 500'000'000;
 
 }  // namespace
@@ -35,7 +36,7 @@ DaemonLink::DaemonLink(const PipelineSettings& settings, const TransportSettings
   if (!lcm_.tick_channel.empty()) recorder_.emplace(settings, provenance, shadow);
   frames_.resize(static_cast<std::size_t>(
       recorder_ ? std::min(kFrameCapacity, recorder_->frame_capacity()) : kFrameCapacity));
-  // Everything that grows is grown here, so that the loop never has to.
+  // All buffers are grown here, so that the loop never has to.
   for (auto* list : {&reference_message_.u_rad, &reference_message_.velocity_radps,
                      &reference_message_.acceleration_radps2})
     list->reserve(2 * kMaxSegments);
@@ -72,7 +73,7 @@ TickInput DaemonLink::collect(std::int64_t now_ns) noexcept {
   return input_;
 }
 
-/// What comes in while the queue is emptied belongs to this tick as well.
+/// Messages that come in while the queue is being emptied also belong to this tick.
 std::int64_t DaemonLink::arrival_ns(const ReceivedMessage& packet) const noexcept {
   return std::min(packet.arrival_ns, now_ns_);
 }
@@ -111,7 +112,7 @@ void DaemonLink::take_operator(const ReceivedMessage& packet) noexcept {
                      age_ns(now_ns_, newest_operator_ns_) > kNumberForgotten_ns;
   if (newer) operator_sequence_ = operator_message_.sequence;
   newest_operator_ns_ = now_ns_;
-  // Whoever wants the arm vented is right, whatever the number; so is a request nobody knows.
+  // A request to vent is obeyed whatever its sequence number; so is a request of an unknown kind.
   using Request = softarm_messages::operator_command_t;
   const bool arm = operator_message_.request == Request::ARM;
   const bool emergency = operator_message_.request == Request::EMERGENCY_STOP;
@@ -130,7 +131,7 @@ void DaemonLink::take_measurement(const ReceivedMessage& packet) noexcept {
   }
   newest_measurement_ns_ = arrival_ns(packet);
   std::copy(measured.begin(), measured.end(), measured_bar_.begin());
-  // What the valves measure answers to whoever commands them: not to a shadow.
+  // Measured pressures respond to the daemon that commands the valves, not to a shadow.
   if (messages_.pressure_command.shadow == 0) input_.measured_bar = &measured_bar_;
 }
 

@@ -12,7 +12,7 @@ namespace {
 /// Zero commands sent before leaving: one may be lost on the wire.
 constexpr int kLastCommands = 3;
 constexpr std::int64_t kRepeatPause_ns = 500'000;
-constexpr std::int64_t kManyMissed = 1'000'000;  // more are no worse, and fit an int
+constexpr std::int64_t kManyMissed = 1'000'000;  // a larger count means nothing new; fits an int
 
 }  // namespace
 
@@ -24,7 +24,7 @@ DaemonLoop::DaemonLoop(const PipelineSettings& settings, const TransportSettings
 
 void DaemonLoop::run(const std::function<bool()>& stop_requested,
                      const std::function<void(const Report&)>& after_tick) {
-  // Without SCHED_FIFO, or where it was refused, overruns say nothing about the daemon.
+  // Without SCHED_FIFO overruns are not evidence of a fault in the daemon.
   judge_overruns_ = runs_under_fifo();
   const std::int64_t start_ns = monotonic_now_ns();
   PeriodicDeadline deadline(pipeline_.period_ns(), start_ns);
@@ -47,7 +47,7 @@ void DaemonLoop::run(const std::function<bool()>& stop_requested,
     if (stopping && pipeline_.output().reason == Reason::shutdown && pipeline_.fully_vented())
       ++vented_commands;
   }
-  // What was sent only once, not all at once: a logger's queue is short.
+  // Repeats the records sent only once, a few at a time: a logger's queue is short.
   while (link_.repeat_record()) sleep_until_ns(monotonic_now_ns() + kRepeatPause_ns);
 }
 

@@ -33,7 +33,7 @@ EventLogReader::EventLogReader(const std::filesystem::path& path)
                              ": is it an LCM log (softarm import, lcm-logger)?");
 }
 
-/// Reads on until `wanted` bytes lie behind the cursor, or the log ends; returns how many do.
+/// Reads until `wanted` bytes follow the cursor, or the log ends; returns how many follow it.
 std::size_t EventLogReader::available(std::size_t wanted) {
   while (buffer_.size() - at_ < wanted && stream_.good()) {
     buffer_.erase(buffer_.begin(), buffer_.begin() + static_cast<std::ptrdiff_t>(at_));
@@ -51,8 +51,8 @@ bool EventLogReader::sync_at(std::size_t offset) const {
   return std::equal(kSync.begin(), kSync.end(), buffer_.data() + at_ + offset);
 }
 
-/// Does another sync word begin within the `size` bytes behind the cursor, all of them in the
-/// buffer, even if it ends beyond them? Every byte is searched once, however often this is asked.
+/// Whether another sync word begins within the `size` bytes after the cursor (all in the buffer),
+/// even if it ends beyond them. Every byte is searched only once, however often this is called.
 bool EventLogReader::meets_sync(std::size_t size) {
   const auto offset_of = [this](std::int64_t log_position) {
     return static_cast<std::size_t>(log_position - base_);
@@ -68,7 +68,7 @@ bool EventLogReader::meets_sync(std::size_t size) {
   return found != end;
 }
 
-/// Size of the event at the cursor, or 0 where there is none to be believed.
+/// Size of the event at the cursor, or 0 if there is no acceptable one.
 std::size_t EventLogReader::believable_size() {
   if (available(kHeader) < kHeader || !sync_at(0)) return 0;
   const std::byte* header = buffer_.data() + at_;

@@ -63,7 +63,7 @@ FrameAssembler::Outcome FrameAssembler::add(std::size_t body, const BodyPose& po
 
 void FrameAssembler::set_capture_ns(std::int64_t capture_ns) noexcept {
   current_.capture_ns = capture_ns;
-  if (!under_way_) done_.capture_ns = capture_ns;  // done with its first body
+  if (!under_way_) done_.capture_ns = capture_ns;  // complete with its first body
 }
 
 bool FrameAssembler::take_done(MocapFrame& frame) noexcept {

@@ -15,7 +15,7 @@
 namespace softarm {
 namespace {
 
-/// LCM takes channel names for regular expressions; we mean them literally.
+/// LCM interprets channel names as regular expressions; ours are literal.
 std::string quoted(const std::string& channel) {
   std::string pattern;
   for (const char c : channel) {
@@ -47,9 +47,9 @@ void LcmNode::look_at_clocks() noexcept {
   arrivals_.look(now.monotonic_ns, now.wall_ns);
 }
 
-/// noexcept: nothing may unwind through LCM's C code, where it would leave a lock behind.
+/// noexcept: no exception may unwind through LCM's C code, which would leave a lock held.
 void LcmNode::dispatch(const lcm_recv_buf_t* packet, const char* /*channel*/, void* user) noexcept {
-  // A packet with an unterminated channel name has been seen to claim 2^32 - 1 bytes.
+  // A packet with an unterminated channel name has been observed to claim 2^32 - 1 bytes.
   if (packet->data == nullptr || packet->data_size > LcmNode::kLargestMessage) return;
   const auto& subscription = *static_cast<const Subscription*>(user);
   subscription.handler({.bytes = {static_cast<const std::byte*>(packet->data), packet->data_size},

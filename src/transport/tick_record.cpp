@@ -67,7 +67,7 @@ void get(const tick_frame_t& from, MocapFrame& frame) {
   }
 }
 
-/// A record that holds as much as one of this arm can hold, its lists with it.
+/// The largest possible record of this arm.
 tick_record_t largest_record(const PipelineSettings& settings, const std::string& build) {
   tick_record_t record{};
   const auto dof = static_cast<std::size_t>(settings.arm.dof());
@@ -83,7 +83,7 @@ tick_record_t largest_record(const PipelineSettings& settings, const std::string
   tick_frame_t frame{};
   put(MocapFrame{.segments = settings.arm.size(), .body = {}}, frame);
   const int left = LcmNode::kLargestMessage - record.getEncodedSize();
-  const int size = frame.getEncodedSize() - 8;  // without a hash of its own
+  const int size = frame.getEncodedSize() - 8;  // without the hash of a separate message
   record.num_frames =
       static_cast<std::int16_t>(std::clamp<int>(left / size, 1, TickRecorder::kMostFrames));
   record.frames.assign(static_cast<std::size_t>(record.num_frames), frame);
@@ -101,8 +101,8 @@ bool is_intact(std::span<const std::byte> encoded) noexcept {
 }
 
 void to_record(const TickInput& input, tick_record_t& record) {
-  // A new field of TickInput stops the build here: it belongs into lcmtypes/tick_record_t.lcm, into
-  // this function, into RecordedInput::from and into the size that decode() checks.
+  // A new field of TickInput breaks the build here: it must be added to lcmtypes/tick_record_t.lcm,
+  // to this function, to RecordedInput::from and to the size that decode() checks.
   const auto& [now_ns, frames, reference, requests, command_expired, consecutive_overruns,
                newest_measurement_ns, measured_bar, newest_go_ns] = input;
   const auto& [arm, disarm, emergency_stop, shutdown] = requests;

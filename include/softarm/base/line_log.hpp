@@ -1,4 +1,4 @@
-// Lines from a loop that must not wait, printed by a thread that may.
+// Log lines of a loop that must not block, printed by a thread that may.
 #pragma once
 
 #include <fmt/format.h>
@@ -15,22 +15,25 @@
 
 namespace softarm {
 
-/// For one writing thread. Bounded: a line that does not fit is cut, and lines that come faster
-/// than they can be printed (kCapacity at once, 10 a second for long) are counted, not queued.
+/// A bounded log for one writing thread. A line that does not fit is cut, and lines that come
+/// faster than they can be printed (kCapacity at once, 10 per second sustained) are counted, not
+/// queued.
 class LineLog {
  public:
+  /// Lines that may wait to be printed.
   static constexpr std::size_t kCapacity = 64;
+  /// Characters kept of a line.
   static constexpr std::size_t kLongestLine = 240;
 
-  /// @param program  begins every line: "program: line"
-  /// @param print  called from the thread, one whole line at a time with its newline; must not
-  /// throw
+  /// @param program  prefix of every line: "program: line"
+  /// @param print  called from the printing thread with one whole line at a time, newline included;
+  /// must not throw
   LineLog(std::string program, std::function<void(const std::string&)> print);
 
-  /// Prints what is still to be printed and ends the thread.
+  /// Prints the waiting lines and ends the thread.
   void finish() { thread_ = {}; }
 
-  /// Formats into a buffer that is there already: neither allocates nor waits.
+  /// Formats a line into a preallocated buffer: neither allocates nor waits.
   template <class... Arguments>
   void add(fmt::format_string<Arguments...> format, Arguments&&... arguments) noexcept {
     const std::size_t head = head_.load(std::memory_order_relaxed);

@@ -1,6 +1,6 @@
-// What a person at the emergency stop needs: the daemon's status, and requests to it. The names of
-// the channels are enough for it, so that a mistake elsewhere in an experiment keeps nobody from
-// venting the arm.
+// What a person at the emergency stop needs: the daemon's status, and requests to it. It needs only
+// the names of the channels, so that an error elsewhere in an experiment file cannot prevent anyone
+// from venting the arm.
 #pragma once
 
 #include <cstdint>
@@ -22,38 +22,40 @@
 
 namespace softarm {
 
-/// What is asked of a running daemon; the numbers are those of operator_command_t.
+/// A request to a running daemon; the numbers are those of operator_command_t.
 enum class OperatorRequest : std::int8_t {
   disarm = 0,         ///< vent and stay vented; acknowledges a FAULT
   arm = 1,            ///< the arm may be pressurised
   emergency_stop = 2  ///< vent and go to FAULT, until `disarm` and then `arm`
 };
 
-/// What came of it.
+/// The outcome of a request.
 enum class RequestOutcome {
   done,     ///< the daemon's status shows it
-  refused,  ///< the daemon was heard, but its status does not show it
-  unheard   ///< no daemon was heard
+  refused,  ///< a status was received, but it does not show it
+  unheard   ///< no status was received
 };
 
-/// A message as it came; valid only during the callback.
+/// A message as it was received; valid only during the callback.
 struct ArmMessage {
   const std::string& channel;
   std::span<const std::byte> bytes;
-  std::int64_t arrival_ns;  ///< our monotonic clock
-  std::int64_t wall_us;     ///< the same on the wall clock
+  std::int64_t arrival_ns;  ///< on the clock of the client
+  std::int64_t wall_us;     ///< the arrival on the wall clock
 };
 
-/// Belongs to one thread. Messages are handled, and callbacks called, only in `update`, `wait_for`,
-/// `wait_for_status` and `request`. A callback may throw; what it throws leaves that function. Each
-/// kind of callback has one place: setting another one replaces it. Times are ns of CLOCK_MONOTONIC
-/// unless a clock was given.
+/// Status of the daemon, and requests to it. Use from one thread. Messages are handled, and
+/// callbacks called, only in `update`, `wait_for`, `wait_for_status` and `request`. A callback may
+/// throw; its exception leaves that function. There is one callback of each kind: setting another
+/// replaces it. Times are ns of CLOCK_MONOTONIC unless a clock was given.
 class OperatorClient {
  public:
+  /// Returns the current time in ns.
   using Clock = std::function<std::int64_t()>;
 
-  /// @param clock  what counts as now, in ns, not decreasing: for tests. What waits for a time of
-  /// this clock (`update`, `vent_to_rest`) needs it to go on.
+  /// @param lcm  network and channels of the arm
+  /// @param clock  the current time in ns, not decreasing: for tests. Functions that wait for a
+  /// time of this clock (`update`, `vent_to_rest`) need it to advance.
   /// @throws TransportError
   explicit OperatorClient(const LcmSettings& lcm, Clock clock = monotonic_now_ns)
       : OperatorClient(lcm, 0, std::move(clock)) {}
@@ -61,67 +63,70 @@ class OperatorClient {
   OperatorClient(const OperatorClient&) = delete;
   OperatorClient& operator=(const OperatorClient&) = delete;
 
+  /// The current time of the client's clock, in ns.
   std::int64_t now_ns() const { return clock_(); }
 
-  /// Waits for a message until `until_ns`, handles it and all others that are there, and returns:
-  /// false where none came, or a signal cut the wait short. @throws what callbacks throw
+  /// Waits for a message until `until_ns`, then handles it and all others that have arrived.
+  /// Returns false if none came, or if a signal interrupted the wait. @throws what callbacks throw
   bool update(std::int64_t until_ns);
-  /// Handles messages, one by one, until `reached()`, which is asked after each, or for
-  /// `patience_s` of the real clock; returns whether it was reached.
+  /// Handles messages one by one until `reached()` is true, which is evaluated after each, or until
+  /// `patience_s` of the real clock have passed. Returns whether it was reached.
   bool wait_for(const std::function<bool()>& reached, double patience_s);
   /// Handles messages until the next status; false if none comes within `patience_s`.
   bool wait_for_status(double patience_s);
 
-  /// Newest status of the daemon that commands the arm; none before the first. Those of a shadow
-  /// (softarmd --shadow) command nothing, and hide nothing: they only go to `on_status`.
+  /// Newest status of the daemon that commands the arm; none before the first. Statuses of a shadow
+  /// (softarmd --shadow), which commands nothing, only go to `on_status`.
   const std::optional<ArmStatus>& status() const { return status_; }
-  /// Its arrival; kNever before the first.
+  /// Arrival of the newest status; kNever before the first.
   std::int64_t status_ns() const { return status_ns_; }
-  /// Within the last second a daemon reported that it pressurises the arm, or may.
+  /// Whether a daemon reported within the last second that it pressurises the arm, or may do so.
   bool daemon_armed() const;
-  /// "ACTIVE (none)", or "not heard", of the newest status.
+  /// Mode and reason of the newest status, such as "ACTIVE (none)", or "not heard".
   std::string daemon_text() const;
-  /// Called with every status, a shadow's too, before it becomes `status`.
+  /// Sets the callback for every status, including those of a shadow; it is called before the
+  /// status becomes `status()`.
   void on_status(std::function<void(const ArmStatus&)> callback) { on_status_ = callback; }
-  /// Called with every message of the channels listened to, before what is made of it: the status,
-  /// what else `listen` names, and what ArmClient listens to.
+  /// Sets the callback for every message of the channels listened to (the status, those named to
+  /// `listen`, and those of ArmClient); it is called before the message is decoded.
   void on_message(std::function<void(const ArmMessage&)> callback) { on_message_ = callback; }
 
-  /// Messages of this channel, too, go to `on_message`. @throws TransportError
+  /// Also passes the messages of this channel to `on_message`. @throws TransportError
   void listen(const std::string& channel) { listen(channel, {}); }
 
-  /// Asks once, does not wait. @throws TransportError if it could not be sent
+  /// Sends one request and does not wait. @throws TransportError if it could not be sent
   void send(OperatorRequest what);
-  /// Asks 20 times a second until a status that came after the first request shows it, or for
-  /// `patience_s`. Blocks. @throws TransportError if none could be sent
+  /// Sends requests 20 times a second until a status received after the first request shows the
+  /// result, or until `patience_s` have passed. Blocks. @throws TransportError if none could be
+  /// sent
   RequestOutcome request(OperatorRequest what, double patience_s = 2.0);
-  /// The dead-man input: "go" holds for safety.deadman_timeout_s from its arrival, and not any
-  /// longer once it is taken back. @throws TransportError; std::logic_error where
+  /// Sends the dead-man input: "go" (true) holds for safety.deadman_timeout_s from its arrival, or
+  /// until it is withdrawn (false). @throws TransportError; std::logic_error where
   /// lcm.deadman_channel is empty
   void send_go(bool go);
 
-  /// From now on every message of the channels that LcmSettings names (ArmClient: those of motion
-  /// capture too) goes to an LCM event log, which EventLogReader, `softarm report`, `softarm
-  /// replay` and lcm-logplayer read. What cannot be written (a full disk) throws std::runtime_error
+  /// From now on writes every message of the channels that LcmSettings names (ArmClient: also those
+  /// of motion capture) to an LCM event log, which EventLogReader, `softarm report`, `softarm
+  /// replay` and lcm-logplayer read. A later write failure (a full disk) throws std::runtime_error
   /// from the function that handles messages. @throws std::runtime_error, TransportError
   void record(const std::filesystem::path& log);
-  /// Everything is in the file after this. @throws std::runtime_error
+  /// Ends the recording; the file is complete afterwards. @throws std::runtime_error
   void stop_recording();
 
  protected:
   using Handler = std::function<void(const ArmMessage&)>;
-  /// @param segments  only statuses of so many are taken; 0: any
+  /// @param segments  statuses with another number of segments are ignored; 0: any
   OperatorClient(const LcmSettings& lcm, int segments, Clock clock);
-  /// Begins to listen to a channel; a second handler of one is called after the first.
+  /// Begins to listen to a channel; a second handler of the same channel is called after the first.
   void listen(const std::string& channel, Handler handler);
-  /// After every round of handling, also one without messages.
+  /// Called after every round of handling, also after one without messages.
   virtual void after_round() {}
   /// Encodes and sends. @throws TransportError
   template <class Message>
   void publish(const std::string& channel, const Message& message) {
     if (!node_.publish(channel, message)) throw_unsent();
   }
-  /// Counts up from one call to the next, and from one program, machine or boot to the next.
+  /// A sequence number that increases from call to call, and across programs, machines and boots.
   std::int64_t next_sequence();
 
  private:
@@ -147,7 +152,7 @@ class OperatorClient {
   LcmNode node_;
   std::int64_t newest_arrival_ns_ = kNever;
   std::deque<Channel> channels_;
-  std::deque<Received> received_;  ///< by LCM's C code, through which nothing may be thrown
+  std::deque<Received> received_;  ///< filled from LCM's C code, through which nothing may throw
   std::optional<EventLogWriter> log_;
   std::function<void(const ArmMessage&)> on_message_;
   std::function<void(const ArmStatus&)> on_status_;

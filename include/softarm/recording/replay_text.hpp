@@ -1,4 +1,4 @@
-// What a replay found, for people.
+// The result of a replay as text.
 #pragma once
 
 #include <string>
@@ -8,11 +8,12 @@
 
 namespace softarm {
 
-/// Every tick was in an undamaged log, and every command and status is the same, bit for bit.
+/// Whether every tick was in an undamaged log, and every command and status is the same, bit for
+/// bit.
 bool is_identical(const ReplaySummary& summary, const EventLogReader& log);
 
 /// Counts, gaps, the first difference and the verdict, in lines.
-/// @param log_name of what `log` has read
+/// @param log_name  file name of `log`
 std::string replay_text(const ReplaySummary& summary, const EventLogReader& log,
                         const std::string& log_name);
 

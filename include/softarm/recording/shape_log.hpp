@@ -1,4 +1,4 @@
-// The simulated arm's shape while it runs: DIR/shape.csv, for pictures of what u alone cannot show.
+// Logs the shape of the simulated arm to FOLDER/shape.csv, for plots of what u alone does not show.
 #pragma once
 
 #include <Eigen/Core>
@@ -14,22 +14,22 @@
 
 namespace softarm {
 
-/// A part's bend as u (2 numbers a part, rad), from the plant's coordinates: segments, pieces, or
-/// links (R_x(a) R_y(b) is u = (b, -a) to first order).
+/// The bend of every part as u (2 numbers per part, rad), from the plant's coordinates. Parts are
+/// segments, pieces, or links (R_x(a) R_y(b) is u = (b, -a) to first order).
 Eigen::VectorXd part_bends(const PlantSettings& plant, const Eigen::VectorXd& coordinates);
 
-/// Points along the arm from base to tip, world frame, m: the ends of every link, or points on
-/// every arc; as many for any coordinates of one plant.
+/// Points along the arm from base to tip, in m in the world frame: the ends of every link, or
+/// points on every arc. Their number depends only on the plant.
 std::vector<Eigen::Vector3d> arm_points(const PlantSettings& plant,
                                         const Eigen::VectorXd& coordinates);
 
-/// Writes a row of bends and points every 20 ms; no file where there is no simulated arm.
+/// Writes a row of bends and points every 20 ms; no file if there is no simulated arm.
 class ShapeLog {
  public:
-  /// Takes away what an earlier run left.
+  /// Removes the file of an earlier run from `folder`.
   ShapeLog(const std::filesystem::path& folder, const Experiment& experiment);
 
-  /// Rows without the plant's coordinates are passed over.
+  /// Appends a row; rows without the plant's coordinates are ignored.
   /// @throws std::runtime_error if the file cannot be made
   void add(const LogRow& row);
 

@@ -1,5 +1,4 @@
-// What a daemon, its valves and a simulated arm publish, as plain values: for everybody who
-// listens.
+// The messages of a daemon, its valves and a simulated arm as plain values, for every listener.
 #pragma once
 
 #include <cstddef>
@@ -14,8 +13,8 @@
 
 namespace softarm {
 
-/// What a controller saw, decided and commanded in one tick (controller_status_t). Vectors are from
-/// base to tip: 2n numbers, n, or one a chamber.
+/// What a controller measured, decided and commanded in one tick (controller_status_t). Vectors are
+/// from base to tip: 2n numbers (pairs per segment), n, or one per chamber.
 struct ArmStatus {
   std::int64_t time_us = 0;  ///< the daemon's monotonic clock at the tick
   std::int64_t tick = 0;
@@ -26,13 +25,14 @@ struct ArmStatus {
   Mode mode = Mode::init;
   Reason reason = Reason::starting;  ///< why the mode is not ACTIVE
 
-  bool shadow = false;  ///< it computes commands that are not for the valves
+  bool shadow = false;  ///< it computes commands that the valves must not apply
   bool armed = false;
   bool saturated = false;
   bool slew_limited = false;
-  bool reference_limited = false;  ///< a soft limit bent the reference, or a live one was refused
+  bool reference_limited =
+      false;  ///< a soft limit changed the reference, or a live reference was refused
   bool soft_limit = false;
-  bool bounded = false;  ///< the controller bounded something near a singularity
+  bool bounded = false;  ///< the controller limited a term near a singularity
 
   double frame_age_s = std::numeric_limits<double>::quiet_NaN();
   std::int64_t frames_accepted = 0;
@@ -46,43 +46,47 @@ struct ArmStatus {
   SegmentVector reference_u_rad;               ///< NaN unless ACTIVE
   SegmentVector tau_actuation_nm;              ///< NaN unless ACTIVE
   SegmentScalars phi_rad, theta_rad;           ///< the same u in polar coordinates
-  SegmentScalars torsion_rad, length_error_m;  ///< what a PCC segment cannot have: residuals
-  PressureVector pressure_bar;                 ///< commanded; N m with actuation by torque
+  SegmentScalars torsion_rad, length_error_m;  ///< residuals: a PCC segment has none
+  PressureVector pressure_bar;                 ///< commanded, bar; N m with actuation by torque
 
+  /// Number of segments n.
   int segments() const noexcept { return static_cast<int>(theta_rad.size()); }
-  /// It pressurises the arm, or may do so in its next tick without being asked by anybody.
+  /// Whether it pressurises the arm, or may do so in its next tick without a further request.
   bool may_pressurise() const noexcept {
     return armed || mode == Mode::active || mode == Mode::hold;
   }
-  /// "VENT (frames_stale)".
+  /// Mode and reason, such as "VENT (frames_stale)".
   std::string text() const;
 };
 
-/// What a simulated arm really does, which no sensor of a real one would show (plant_state_t).
+/// True state of a simulated arm (plant_state_t), which no sensor of a real arm measures
+/// completely.
 struct PlantState {
-  std::int64_t time_us = 0;  ///< its monotonic clock
-  bool vented = false;       ///< no command is in force: all valves are at zero
-  SegmentVector u_rad, velocity_radps;
-  PressureVector pressure_bar;  ///< behind the valves; N m with actuation by torque
+  std::int64_t time_us = 0;             ///< monotonic clock of the simulator
+  bool vented = false;                  ///< no command is valid: all valves are at zero
+  SegmentVector u_rad, velocity_radps;  ///< 2n numbers each
+  PressureVector pressure_bar;          ///< behind the valves; N m with actuation by torque
   Eigen::Vector3d tip_m = Eigen::Vector3d::Zero();  ///< world frame
 
+  /// Number of segments n.
   int segments() const noexcept { return static_cast<int>(u_rad.size() / 2); }
 };
 
-/// Set points for every valve, as somebody sent them (pressure_command_t, torque_command_t).
+/// Set points for every valve as they were sent (pressure_command_t, torque_command_t).
 struct ChamberCommand {
   std::int64_t sequence = 0;
-  std::int64_t time_us = 0;      ///< the sender's monotonic clock
-  std::int64_t validity_us = 0;  ///< how long it may be held
-  bool shadow = false;           ///< computed for inspection, never to be applied to valves
-  PressureVector pressure_bar;   ///< above ambient; N m where it is made of torques
+  std::int64_t time_us = 0;      ///< monotonic clock of the sender
+  std::int64_t validity_us = 0;  ///< how long it may be held after arrival
+  bool shadow = false;           ///< computed for inspection, never applied to valves
+  PressureVector pressure_bar;   ///< gauge pressure; N m for a command of torques
 };
 
-/// As message_decoding.hpp: false, and `out` unspecified, unless `bytes` are exactly one message of
-/// the type; values are not judged.
+/// Decodes one controller_status_t as message_decoding.hpp does: returns false, and leaves `out`
+/// unspecified, unless `bytes` are exactly one message of the type. Values are not checked.
 bool decode(std::span<const std::byte> bytes, ArmStatus& out);
+/// The same of a plant_state_t.
 bool decode(std::span<const std::byte> bytes, PlantState& out);
-/// @param by_torque  a torque_command_t is meant
+/// The same of a pressure_command_t, or of a torque_command_t where `by_torque`.
 bool decode(std::span<const std::byte> bytes, bool by_torque, ChamberCommand& out);
 
 }  // namespace softarm

@@ -1,4 +1,4 @@
-// Bytes from the network -> messages. LCM's generated decoders trust the lengths they read and
+// Decodes messages from the network. LCM's generated decoders trust the lengths they read and
 // accept trailing bytes, so every size is checked here before they run.
 #pragma once
 
@@ -20,9 +20,10 @@
 
 namespace softarm {
 
-/// False, and `message` unspecified, unless `bytes` are what the encoder of this type writes: right
-/// hash, lengths within this project's capacities, texts that end there, no byte too few or many.
-/// Values are not judged. Allocates nothing once `message` has held one of its size.
+/// @name Decoding Each returns false, and leaves `message` unspecified, unless `bytes` are exactly
+/// what the encoder of its type writes: the right hash, lengths within the capacities of this
+/// project, terminated texts, no byte missing or left over. Values are not checked. Allocates
+/// nothing once `message` has held one of the same size. @{
 bool decode(std::span<const std::byte> bytes, softarm_messages::mocap_frame_t& message) noexcept;
 bool decode(std::span<const std::byte> bytes,
             softarm_messages::pressure_command_t& message) noexcept;
@@ -42,5 +43,6 @@ bool decode(std::span<const std::byte> bytes, softarm_messages::valves_status_t&
 bool decode(std::span<const std::byte> bytes, softarm_messages::deadman_t& message) noexcept;
 bool decode(std::span<const std::byte> bytes,
             softarm_messages::rigid_transform_t& message) noexcept;
+/// @}
 
 }  // namespace softarm

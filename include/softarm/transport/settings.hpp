@@ -1,6 +1,5 @@
-// What an experiment may choose about the wire: LCM's network and channels, and what motion-capture
-// messages mean.
-// config/template.yaml documents every setting.
+// Settings of the transport: LCM's network and channels, and the meaning of motion-capture
+// messages. config/template.yaml documents every setting.
 #pragma once
 
 #include <Eigen/Core>
@@ -11,7 +10,7 @@
 
 namespace softarm {
 
-/// LCM provider and channels; distinct where two arms share a machine.
+/// LCM provider and channels; two arms on one machine need different ones.
 struct LcmSettings {
   std::string url = "udpm://239.255.76.67:7667?ttl=0";
   std::string mocap_channel = "SOFTARM_MOCAP";
@@ -27,18 +26,18 @@ struct LcmSettings {
   std::string deadman_channel;
 };
 
-/// Who sends frames, and in which messages.
+/// Sender of the frames, and the type of its messages.
 enum class MocapSourceKind {
   softarm,         ///< mocap_frame_t
   optitrack,       ///< optitrack_frame_t
-  rigid_transform  ///< rigid_transform_t, one channel a body: lcm.mocap_channel, _, its name
+  rigid_transform  ///< rigid_transform_t, one channel per body: lcm.mocap_channel, _, its name
 };
-/// In which order the four numbers of a quaternion are sent.
+/// Order in which the four numbers of a quaternion are sent.
 enum class QuaternionOrder { xyzw, wxyz };
-/// Of positions as they are sent.
+/// Unit in which positions are sent.
 enum class LengthUnit { metre, millimetre };
 
-/// What a frame's numbers mean.
+/// Meaning of the numbers in a frame.
 struct MocapSourceSettings {
   MocapSourceKind source = MocapSourceKind::softarm;
   LengthUnit unit = LengthUnit::metre;
@@ -47,17 +46,19 @@ struct MocapSourceSettings {
   Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();
 };
 
-/// A marker plate: where on it the frame S_i sits that the arm is made of.
+/// A marker frame: the pose of the segment frame S_i in the frame of the rigid body that is
+/// tracked.
 struct PlateSettings {
   std::string name;
   Eigen::Vector3d position_m = Eigen::Vector3d::Zero();
-  /// Rotation vector of S_i in the body's own frame: R_world_S = R_world_body exp(rotation^).
+  /// Rotation vector of S_i in the body's frame: R_world_S = R_world_body exp(rotation^).
   Eigen::Vector3d rotation_rad = Eigen::Vector3d::Zero();
 
+  /// Equal in every field.
   bool operator==(const PlateSettings&) const = default;
 };
 
-/// The channel of a body that has one of its own.
+/// The channel of a body where every body has a separate one (MocapSourceKind::rigid_transform).
 inline std::string body_channel(const LcmSettings& lcm, const PlateSettings& plate) {
   return lcm.mocap_channel + "_" + plate.name;
 }
@@ -66,8 +67,8 @@ inline std::string body_channel(const LcmSettings& lcm, const PlateSettings& pla
 struct BodySettings {
   int base_id = 0;                                 ///< -1: the base is fixed by arm.base
   std::vector<int> segment_ids;                    ///< n ids, from the base to the tip
-  PlateSettings base_plate = {};                   ///< not looked at where the base is fixed
-  std::vector<PlateSettings> segment_plates = {};  ///< n, or none: S_i are the bodies' own frames
+  PlateSettings base_plate = {};                   ///< unused where the base is fixed
+  std::vector<PlateSettings> segment_plates = {};  ///< n, or none: S_i are then the body frames
 };
 
 /// Connections of softarmd.
@@ -75,8 +76,8 @@ struct TransportSettings {
   LcmSettings lcm;
   MocapSourceSettings mocap;
   BodySettings bodies;
-  /// How a frame's capture time is brought to our monotonic clock; safety.frame_latency_s is the
-  /// declared latency of either way.
+  /// How the capture time of a frame is converted to our monotonic clock; safety.frame_latency_s is
+  /// the declared latency in both modes.
   ClockMode capture_time = ClockMode::sender;
 };
 

@@ -73,7 +73,7 @@ TEST_F(Guarded, EndsWithTheFirstThingThatGoesWrong) {
                  publish_status(Mode::hold, Reason::frames_late);
                  ASSERT_TRUE(client->wait_for_status(test::kPatience_s));
                }},
-           Row{"somebody commands pressures on SOFTARM_PRESSURE_COMMAND",
+           Row{"another program commands pressures on SOFTARM_PRESSURE_COMMAND",
                [&] {
                  peer->publish(lcm.command_channel, [] {
                    auto command = test::example<pressure_command_t>(1, 3);
