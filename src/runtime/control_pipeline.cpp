@@ -35,7 +35,7 @@ ControlPipeline::ControlPipeline(const PipelineSettings& settings)
                  body_noise(settings.estimation, settings.arm.size())),
       filter_(settings.estimation, settings.arm.size()),
       observer_(make_observer(settings)),
-      delay_ns_(observer_ ? to_ns(settings.control.delay_s) : 0),
+      delay_ns_(observer_ ? to_ns(settings.control.dead_time_s) : 0),
       safety_(settings.safety, period_s_),
       reference_(settings.reference, settings.control, settings.arm),
       controller_(settings.arm, settings.control),
