@@ -16,14 +16,14 @@ namespace softarm {
 inline constexpr int kMaxChambersPerSegment = 8;
 inline constexpr int kMaxChambers = kMaxChambersPerSegment * kMaxSegments;
 
-/// One pressure a chamber (bar), segment after segment in the order of the valves. Storage in
-/// place: never allocates.
+/// One pressure per chamber (bar), segment by segment in the order of the valves. Storage in place:
+/// never allocates.
 using PressureVector = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, kMaxChambers, 1>;
-/// One number a segment.
+/// One number per segment.
 using SegmentScalars = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, kMaxSegments, 1>;
 
-/// The chambers of one segment: which tau_A they reach, and the pressures that give it. `Dimension`
-/// torques are kept: two, or the one in the plane of a planar arm.
+/// The chambers of one segment: which tau_A they can reach, and the pressures that give it.
+/// `Dimension` is the number of torque components: two, or one in the plane of a planar arm.
 template <int Dimension>
 class ChamberMap {
  public:
@@ -79,12 +79,12 @@ struct Allocation {
   bool saturated = false;  ///< any s < 1
 };
 
-/// Every segment's chambers. A planar arm's out-of-plane torque is dropped both ways: its structure
-/// carries it. With actuation by torque the "pressures" are tau_A itself, shortened a segment where
-/// a component is beyond the limit.
+/// The chambers of all segments. A planar arm's out-of-plane torque is dropped in both directions:
+/// its structure carries it. With actuation by torque the "pressures" are tau_A itself, scaled down
+/// per segment where a component exceeds the limit.
 class PressureAllocator {
  public:
-  /// Throws std::invalid_argument (segment, expected, got, cure) for a map that cannot reach every
+  /// @throws std::invalid_argument (segment, expected, got, fix) for a map that cannot reach every
   /// torque direction: fewer than 3 chambers (2 if planar) or more than kMaxChambersPerSegment, a
   /// gain that is not positive, all chambers in a half plane, limits that exclude zero torque.
   explicit PressureAllocator(const ActuationSettings& settings);

@@ -34,7 +34,7 @@ struct TickInput {
   std::span<const MocapFrame> frames;  ///< in order of arrival, capture times on our clock
   const LiveReferenceInput* reference = nullptr;  ///< the newest, if one came
   OperatorRequests requests = {};
-  bool command_expired = false;  ///< so long ago was one sent that the valves have vented meanwhile
+  bool command_expired = false;  ///< the last one sent has expired: the valves have vented
   int consecutive_overruns = 0;  ///< ticks missed in a row; zero where they are not to be judged
   /// Arrival of the newest pressure measurement, where the valves publish them.
   std::int64_t newest_measurement_ns = kNever;
@@ -67,8 +67,8 @@ struct TickOutput {
 /// allocates nothing and throws nothing after construction.
 class ControlPipeline {
  public:
-  /// @throws std::invalid_argument as the rooms it is made of, for settings that do not fit
-  /// together
+  /// @throws std::invalid_argument for settings that do not fit together, as the modules it is
+  /// composed of
   explicit ControlPipeline(const PipelineSettings& settings);
 
   const TickOutput& tick(const TickInput& input) noexcept;
