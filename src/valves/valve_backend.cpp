@@ -25,7 +25,7 @@ std::map<std::string, ValveBackendFactory>& factories() {
 
 void add_valve_backend(const std::string& name, ValveBackendFactory make) {
   if (!factories().emplace(name, std::move(make)).second)
-    throw std::invalid_argument("two valve back ends with the name  " + name);
+    throw std::invalid_argument("two valve back ends with the name " + name);
 }
 
 std::vector<std::string> valve_backend_names() {

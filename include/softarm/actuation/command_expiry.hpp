@@ -59,9 +59,8 @@ class CommandExpiry {
   bool vented() const noexcept { return expires_ns_ == kForever; }  ///< no command is in force
   std::int64_t expires_ns() const noexcept { return expires_ns_; }  ///< kForever while vented
   std::int64_t sequence() const noexcept { return sequence_; }      ///< of the command in force
-  const Eigen::VectorXd& set_points_bar() const noexcept {
-    return set_points_bar_;
-  }  ///< zero while vented
+  /// Set points in force, one per chamber (bar); zero while vented.
+  const Eigen::VectorXd& set_points_bar() const noexcept { return set_points_bar_; }
 
  private:
   std::int64_t longest_ns_;

@@ -35,10 +35,12 @@ class ChamberMap {
   ChamberMap(const std::vector<Torque>& columns, double min_pressure_bar, double max_pressure_bar,
              double bias_pressure_bar);
 
+  /// Number of chambers.
   int size() const noexcept { return size_; }
-  /// Smallest and largest distance (N m) from zero torque to a facet of the reachable set;
-  /// negative: outside of it.
+  /// Smallest distance (N m) from zero torque to a facet of the reachable set; negative: zero is
+  /// outside the set.
   double weakest_torque_nm() const noexcept;
+  /// Largest such distance (N m).
   double strongest_torque_nm() const noexcept;
 
   /// Largest s in [0, 1] for which s torque is reachable; exact, one pass over the facets of the
@@ -49,7 +51,7 @@ class ChamberMap {
   /// as above. A torque that is not finite counts as unreachable: s = 0.
   double allocate(const Torque& torque_nm, Pressures& pressures_bar) const noexcept;
 
-  /// W p.
+  /// W p (N m) of `size()` pressures (bar).
   Torque torque(const double* pressures_bar) const noexcept;
 
  private:
@@ -89,11 +91,13 @@ class PressureAllocator {
   /// gain that is not positive, all chambers in a half plane, limits that exclude zero torque.
   explicit PressureAllocator(const ActuationSettings& settings);
 
+  /// Number of segments.
   int segments() const noexcept { return segments_; }
   /// Chambers of all segments together.
   int chambers() const noexcept { return chambers_; }
-  /// Index of the first chamber of a segment in a PressureVector, and their number.
+  /// Index in a PressureVector of the first chamber of a segment (from 0).
   int first_chamber(int segment) const noexcept;
+  /// Number of chambers of a segment (from 0).
   int chambers_of(int segment) const noexcept;
 
   /// tau_actuation_nm: 2n, (tau_x, tau_y) about the local axes. Finds per segment the largest s <=

@@ -12,6 +12,7 @@ double step_towards(double previous, double wanted, double max_step) noexcept;
 /// The last stage before the valves: pressure limits, slew limit, vent ramp. Holds no state.
 class PressureRamps {
  public:
+  /// Takes the limits (bar) and rates (bar/s) of the settings.
   explicit PressureRamps(const ActuationSettings& settings);
 
   /// Clamps `wanted_bar` into [min, max], then moves from `previous_bar` towards it by at most slew

@@ -16,6 +16,7 @@ class ConfigError : public std::runtime_error {
   std::string expected;  ///< with unit and range
   std::string got;
 
+  /// Composes what() of its parts.
   ConfigError(std::string file_name, int line_number, std::string key_path,
               std::string expected_text, std::string got_text);
 };

@@ -32,13 +32,19 @@ struct Form {
 
   /// The same form as a list of any length.
   Form list() const { return sized({kAny}, false, false); }
+  /// A list of as many numbers as the variable has.
   Form each() const { return sized({kAny}, true, false); }
+  /// The same, or one number for all.
   Form one_or_each() const { return sized({kAny}, true, true); }
+  /// The same with pairs [x, y], or one number for both.
   Form one_or_pairs() const { return sized({kAny, 2}, true, true); }
+  /// The same form, where a word may replace the number or the list of numbers.
   Form or_word(const char* word, double number) const { return or_word(word, std::vector{number}); }
   Form or_word(const char* word, const std::vector<double>& numbers) const;
 
+  /// Whether a number is in the range.
   bool contains(double x) const { return (above_low ? x > low : x >= low) && x <= high; }
+  /// Whether the words are false and true.
   bool is_flag() const { return !numeric && words.front().text == "false"; }
   /// The word for these numbers, or the entry of this word; nullptr if there is none.
   const Word* find(const std::vector<double>& numbers) const;

@@ -71,6 +71,7 @@ struct Entry {
   bool conditional = false;         ///< exists only under a condition ...
   bool in_force = true;             ///< ... which is true
 
+  /// Whether the key must be in every file.
   bool required() const { return key.presence == Presence::required && !conditional; }
   /// "nominal, of the motion capture (a number in (0, 10] s)".
   std::string documentation() const;
@@ -89,6 +90,7 @@ class Keys {
   using Body = std::function<void()>;
   using ItemBody = std::function<void(int)>;
 
+  /// Visits for any purpose but `read`.
   explicit Keys(Purpose purpose);
   /// Reads a file and the files it includes. @throws ConfigError
   explicit Keys(const std::filesystem::path& file);
@@ -115,6 +117,7 @@ class Keys {
     visit_numbers({name, doc, presence}, form, numbers);
     assign(value, numbers);
   }
+  /// A flag: false or true.
   void operator()(const char* name, bool& value, const char* doc) {
     (*this)(name, value, one_of({"false", "true"}), doc);
   }
@@ -128,6 +131,7 @@ class Keys {
                   SectionKind kind = SectionKind::plain) {
     section({name, doc, Presence::optional, kind}, [&] { describe(*this, value); });
   }
+  /// A section whose keys `body` visits.
   void section(const Key& key, const Body& body);
   /// A list of sections.
   template <typename Item, typename Describe>

@@ -71,9 +71,13 @@ class ControlPipeline {
   /// composed of
   explicit ControlPipeline(const PipelineSettings& settings);
 
+  /// One tick: validate, estimate, safety, control (17), allocate, limit. To be called once per
+  /// period with increasing times; the result is valid until the next call.
   const TickOutput& tick(const TickInput& input) noexcept;
 
+  /// Result of the latest tick.
   const TickOutput& output() const noexcept { return output_; }
+  /// Frames accepted, rejected and missing since the start.
   const FrameCounters& counters() const noexcept { return validator_.counters(); }
   /// Dropped for their age: captured more than max_latency_s ago, or not yet.
   std::int64_t late_frames() const noexcept { return late_frames_; }
@@ -81,6 +85,7 @@ class ControlPipeline {
   const CurvatureEstimate& estimate() const noexcept { return validator_.estimate(); }
   /// Every commanded pressure is zero.
   bool fully_vented() const noexcept { return output_.pressure_bar.isZero(0.0); }
+  /// Period of the tick, 1/rate_hz.
   std::int64_t period_ns() const noexcept { return period_ns_; }
 
  private:

@@ -20,6 +20,7 @@ class PressureWatch {
   /// Consecutive measurements that must be out of tolerance: a single one may be a disturbance.
   static constexpr int kInRow = 3;
 
+  /// Tolerance and settling time of the settings, for `chambers` chambers of the arm.
   PressureWatch(const SafetySettings& settings, int chambers) noexcept;
 
   /// The pressures commanded from `now_ns` on (bar, one per chamber).
@@ -61,9 +62,11 @@ class CurvatureWatch {
   /// judged: after a gap longer than the settling time the check starts again.
   void judge(std::int64_t now_ns, ConstVectorRef u_rad, ConstVectorRef tau_actuation_nm) noexcept;
 
+  /// Whether the settings have a limit.
   bool used() const noexcept { return limit_nm_ > 0.0; }
   /// Some segment's residual was above the limit throughout the settling time.
   bool strays() const noexcept { return strays_; }
+  /// Starts again, for a gap in which the arm was not under control.
   void reset() noexcept { strays_ = beyond_ = false; }
 
  private:

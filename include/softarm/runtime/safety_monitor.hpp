@@ -77,6 +77,8 @@ struct SafetyThresholds {
   std::int64_t valve_silence_ns;
   std::int64_t deadman_timeout_ns;
 };
+/// Times given in the settings (s); where zero, derived from control and frame period T and T_f: HOLD
+/// after max(3 T, 3 T_f + latency), VENT after max(0.1 s, 10 T_f, 3 T).
 SafetyThresholds resolve_thresholds(const SafetySettings& settings,
                                     double control_period_s) noexcept;
 
@@ -119,13 +121,19 @@ struct SafetyInput {
 /// arming back.
 class SafetyMonitor {
  public:
+  /// Starts in Mode::init; armed if the settings arm automatically.
   SafetyMonitor(const SafetySettings& settings, double control_period_s) noexcept;
 
+  /// The mode of this tick. To be called once per tick, with times that never go back.
   Mode step(const SafetyInput& input) noexcept;
 
+  /// Mode after the latest step.
   Mode mode() const noexcept { return mode_; }
+  /// Reason of the mode; none in ACTIVE.
   Reason reason() const noexcept { return reason_; }
+  /// Whether the arm may become active once nothing else prevents it.
   bool armed() const noexcept { return armed_; }
+  /// The resolved thresholds.
   const SafetyThresholds& thresholds() const noexcept { return thresholds_; }
 
  private:

@@ -24,6 +24,7 @@ class ModbusServer {
   ModbusServer(const ModbusServer&) = delete;
   ModbusServer& operator=(const ModbusServer&) = delete;
 
+  /// The port it listens on.
   int port() const noexcept { return port_; }
 
   /// Waits for a client until `deadline_ns` of CLOCK_MONOTONIC. Returns true if a client is waiting

@@ -25,7 +25,9 @@ class ModbusTerminal {
 
   /// Connects within `connect_timeout_s`; false: see `error`.
   bool connect() noexcept;
+  /// Closes the connection, if it is open.
   void close() noexcept;
+  /// Whether it is connected; a broken connection is closed.
   bool is_open() const noexcept { return open_; }
 
   /// Writes holding registers from `address` on.

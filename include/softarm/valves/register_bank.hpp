@@ -10,8 +10,11 @@ namespace softarm {
 class RegisterBank {
  public:
   virtual ~RegisterBank() = default;
+  /// All registers.
   virtual std::span<std::uint16_t, 65536> registers() noexcept = 0;
+  /// Whether `count` registers from `address` on may be read.
   virtual bool readable(int address, int count) const noexcept = 0;
+  /// Whether they may be written.
   virtual bool writable(int address, int count) const noexcept = 0;
   /// Called after a request was served; `count` registers from `address` were written (0: read
   /// only).

@@ -18,8 +18,9 @@ RegisterMap register_preset(TerminalKind kind);
 
 /// Number of slots that hold the valves named in `order`.
 int slot_count(const RegisterMap& map, std::span<const int> order) noexcept;
-/// Words of the block of set points, and of the block of measured pressures.
+/// Number of words in the block of set points.
 int write_size(const RegisterMap& map, std::span<const int> order) noexcept;
+/// Number of words in the block of measured pressures.
 int read_size(const RegisterMap& map, std::span<const int> order) noexcept;
 
 /// "" or the fault of the map: words outside their slots, blocks that leave the address space or
@@ -44,10 +45,11 @@ void put_set_points(const RegisterMap& map, std::span<const int> order,
 void take_read_back(const RegisterMap& map, std::span<const int> order,
                     std::span<const std::uint16_t> words, ReadBack& read_back) noexcept;
 
-/// The words of a time-out (s), `timeout_words` of them in use, and back. A time-out that cannot be
+/// The words of a time-out (s), `timeout_words` of them in use. A time-out that cannot be
 /// represented becomes the nearest one that can.
 void put_timeout(const RegisterMap& map, double timeout_s,
                  std::span<std::uint16_t, 2> words) noexcept;
+/// The time-out (s) of these words.
 double timeout_s_of(const RegisterMap& map, std::span<const std::uint16_t, 2> words) noexcept;
 
 }  // namespace softarm

@@ -25,6 +25,7 @@ class SerialLine {
   bool open() noexcept;
   /// Closes the device. Data still queued is sent first, as far as the time-out allows.
   void close() noexcept;
+  /// Whether the device is open.
   bool is_open() const noexcept { return file_ >= 0; }
 
   /// Sends `text` and a newline. Input received before is discarded: a late answer would be taken
@@ -36,6 +37,7 @@ class SerialLine {
 
   /// Reason of the last failure; after a line was received: that it was not understood.
   const char* error() const noexcept;
+  /// Path of the device.
   const std::string& device() const noexcept { return device_; }
 
  private:

@@ -16,6 +16,7 @@ namespace softarm {
 /// power-up: never).
 class SimulatedTerminal : public RegisterBank {
  public:
+  /// `order`: the valve of every chamber, from 0.
   SimulatedTerminal(const RegisterMap& map, std::vector<int> order);
 
   std::span<std::uint16_t, 65536> registers() noexcept override {

@@ -22,6 +22,7 @@ enum class LinkResult {
 
 /// What the hardware reports about the valves of all chambers.
 struct ReadBack {
+  /// For `chambers` chambers, all pressures zero.
   explicit ReadBack(int chambers)
       : actual_bar(Eigen::VectorXd::Zero(chambers)),
         echo_bar(actual_bar),
@@ -48,7 +49,9 @@ class ValveBackend {
 
   /// Opens the connection, closing an open one first. False: `error` has the reason.
   virtual bool connect() noexcept = 0;
+  /// Closes the connection, if it is open.
   virtual void close() noexcept = 0;
+  /// Whether the connection is open.
   virtual bool is_open() const noexcept = 0;
 
   /// Result of `secure`.

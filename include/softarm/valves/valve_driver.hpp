@@ -28,6 +28,7 @@ class ValveDriver {
 
   /// False: queued commands are too old and must be discarded (ValveGuard::wake).
   bool wake(std::int64_t now_ns) noexcept { return guard_.wake(now_ns); }
+  /// A command that arrived at `arrival_ns`, by the rules of CommandExpiry.
   CommandVerdict command(const PressureCommand& command, std::int64_t arrival_ns) noexcept {
     return guard_.command(command, arrival_ns);
   }
@@ -36,17 +37,21 @@ class ValveDriver {
 
   /// From now on every set point is zero. Call it once.
   void stop(std::int64_t now_ns) noexcept;
+  /// Whether `stop` was called.
   bool stopping() const noexcept { return stopping_; }
   /// After `stop`: zero was confirmed, or can no longer be confirmed (0.7 s have passed, or there
   /// is no connection).
   bool stopped(std::int64_t now_ns) const noexcept;
+  /// Closes the connection to the hardware.
   void close() noexcept { backend_->close(); }
 
+  /// The guard, for its state and counters.
   const ValveGuard& guard() const noexcept { return guard_; }
-  /// Set points of the last write (bar, one per chamber), the command that was in force then, and
-  /// what was read back last.
+  /// Set points of the last write (bar, one per chamber).
   const Eigen::VectorXd& written_bar() const noexcept { return written_bar_; }
+  /// Sequence number of the command in force at the last write.
   std::int64_t written_sequence() const noexcept { return sequence_; }
+  /// Result of the last read.
   const ReadBack& read_back() const noexcept { return read_back_; }
 
   /// State and reason in words, with details: "DEGRADED (stuck valve): chamber 5 ...". Written into

@@ -15,13 +15,14 @@ namespace softarm {
 
 /// State of the connection to the terminal, and what is written in it.
 enum class ValveState : std::int8_t {
-  disconnected,  ///< the terminal vents by its own time-out; the next attempt waits its turn
+  disconnected,  ///< the terminal vents by its own time-out; the next attempt waits for the back-off
   securing,      ///< connected: that time-out is being set and read back; no pressure is written
   starting,      ///< set points of zero, until the terminal is ready and reads back well
   vented,        ///< set points of zero: no command is in force, or none may be
   running,       ///< the command in force is written
   degraded       ///< set points of zero: a fault was seen; left when all has been well for a while
 };
+/// Name in messages, in static storage.
 const char* name(ValveState state) noexcept;
 
 /// Why pressures are not what is commanded.
@@ -39,6 +40,7 @@ enum class ValveReason : std::int8_t {
   waiting_for_zero,  ///< until commands have been zero, or silent, once
   shutdown
 };
+/// Name in messages, in static storage; empty for none.
 const char* name(ValveReason reason) noexcept;
 
 /// What the driver does next.
@@ -74,6 +76,7 @@ struct ValveCounters {
 /// Never throws or allocates after construction.
 class ValveGuard {
  public:
+  /// Starts disconnected.
   explicit ValveGuard(const ValveGuardSettings& settings);
 
   /// At the start of a cycle, and right before pressures are written: a decision made before a gap
@@ -86,7 +89,9 @@ class ValveGuard {
     return expiry_.receive(command, arrival_ns);
   }
 
+  /// The action to take now; report its result by `connected`, `secured` or `exchanged`.
   ValveAction next(std::int64_t now_ns) noexcept;
+  /// Result of connecting; after a failure the next attempt waits for the back-off time.
   void connected(bool success, std::int64_t now_ns) noexcept;
   /// @param as_written the time-out read back equals the one that was set.
   void secured(LinkResult result, bool as_written, std::int64_t now_ns) noexcept;
@@ -99,7 +104,9 @@ class ValveGuard {
   /// points can be read back), or nothing else was ever written.
   bool zero_confirmed() const noexcept { return zero_confirmed_; }
 
+  /// State after the latest call.
   ValveState state() const noexcept { return state_; }
+  /// Reason of the state.
   ValveReason reason() const noexcept { return reason_; }
   /// The chamber that DEGRADED, or a report of a stuck valve, refers to; -1: none.
   int chamber() const noexcept { return chamber_; }
@@ -109,6 +116,7 @@ class ValveGuard {
   }
   /// Set points to write (bar, one per chamber), within [0, max_pressure_bar]; zero unless running.
   const Eigen::VectorXd& set_points_bar() const noexcept { return set_points_bar_; }
+  /// Counters since construction.
   const ValveCounters& counters() const noexcept { return counters_; }
 
  private:

@@ -44,7 +44,7 @@ int pulse(const LiveCheckOptions& options, ArmClient& client, Observer& observer
     print(at_rest, options.json);
     print_error(
         "softarm",
-        "no chamber was filled: its limits could not be watched without these:  " + obstacle);
+        "no chamber was filled: its limits could not be watched without these: " + obstacle);
     return kExitFailure;
   }
   say("softarm check: filling every chamber softly, one after the other: THE ARM MOVES. Ctrl-C "
