@@ -14,7 +14,7 @@ int main(int count, char** arguments) try {
   for (Eigen::Index i = 0; i < set.size(); ++i)
     std::printf("%s: %.4g +- %.2g %s\n", set[i].name.c_str(), fit.x[i] * set[i].scale,
                 fit.half_width(i) * set[i].scale, set[i].unit.c_str());
-  std::printf("left over: %.3g mrad rms\n", 1e3 * fit.rms_rad);
+  std::printf("residual: %.3g mrad rms\n", 1e3 * fit.rms_rad);
 } catch (const std::exception& error) {
   std::fprintf(stderr, "%s\n", error.what());
   return 1;

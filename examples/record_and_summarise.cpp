@@ -16,7 +16,7 @@ int main(int argc, char** argv) try {
   ArmClient arm(experiment);
   if (!arm.wait_for([&] { return arm.status() && arm.status()->mode == Mode::active; }, 10.0))
     return std::fprintf(stderr, "not ACTIVE: %s\n", arm.daemon_text().c_str()), 1;
-  arm.record(argv[2]);  // whatever is published about this arm, as lcm-logger would
+  arm.record(argv[2]);  // all messages of this arm, as lcm-logger would
   arm.wait_for([] { return false; }, 5.0);
   arm.stop_recording();
 

@@ -1,4 +1,4 @@
-// A valve back end of your own: a pressure board on a serial line, which speaks lines of text.
+// An own valve back end: a pressure board on a serial line with a protocol of text lines.
 //   "W 200" -> "W 200"                 vents after 200 ms of silence; answers what it took
 //   "S 0.000 0.350" -> "P 0.002 0.347" set points -> measured pressures, bar, one per chamber
 // CONFIG: `valves: {backend: serial_board, device: /dev/ttyUSB0}`, and a rate that the line allows

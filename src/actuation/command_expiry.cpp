@@ -39,7 +39,7 @@ CommandVerdict CommandExpiry::receive(const PressureCommand& command,
     return CommandVerdict::older;
   }
   sequence_ = command.sequence;
-  // Saturating: a validity of "for ever" must not wrap around into the past.
+  // Saturating: an unlimited validity must not wrap around into the past.
   const std::int64_t validity_ns = std::min(command.validity_ns, longest_ns_);
   expires_ns_ = validity_ns < kForever - 1 - arrival_ns ? arrival_ns + validity_ns : kForever - 1;
   std::copy(command.pressure_bar.begin(), command.pressure_bar.end(), set_points_bar_.data());

@@ -44,7 +44,8 @@ void print_summary(const std::string& program, const ValvesLoop& loop,
       counters.no_answers, counters.exceptions, counters.times_degraded, loop.refused()));
 }
 
-/// Prints every change and reports to the service manager; true if zero was confirmed in the end.
+/// Prints every change and reports to the service manager; returns true if zero was confirmed at
+/// the end.
 bool drive(const std::string& program, const Experiment& experiment, ValveDriver& driver) {
   ServiceNotifier service;
   if (!service.problem().empty()) say(fmt::format("{}: warning: {}\n", program, service.problem()));

@@ -58,7 +58,7 @@ class Checks {
     if (!holds) throw keys_.error_at(key, expected, got);
   }
 
-  /// A key's value against a bound: what that is, and why.
+  /// Compares a key's value with a bound; `what` names the bound, `why` gives the reason.
   void compare(bool holds, const char* relation, const std::string& key, double value, double bound,
                const char* what, const char* why) const {
     const std::string_view unit = Key{key.c_str(), ""}.unit();
@@ -84,8 +84,7 @@ class Checks {
     require(seen.insert(item).second, key, expected, got);
   }
 
-  /// What the modules themselves refuse: a map of chambers that cannot reach every direction, and
-  /// the like.
+  /// Errors thrown by the modules, such as a map of chambers that cannot reach every direction.
   template <typename Build>
   void check_module(const std::string& key, const char* expected, const Build& build) const {
     try {
@@ -198,7 +197,7 @@ class Checks {
          fmt::format("{}", bodies.base_id));
   }
 
-  /// A threshold that another one hides never comes into force: it protects nobody.
+  /// A threshold that another one hides never takes effect, so it protects nothing.
   void check_safety() const {
     const SafetySettings& it = experiment_.safety;
     const double tick_s = 1.0 / experiment_.rate_hz;
@@ -231,8 +230,8 @@ class Checks {
       at_least(fmt::format("daemon.{}", key), time_s, 2.0 * tick_s, "two ticks of daemon.rate_hz");
   }
 
-  /// Letters, digits and a few signs: names need no quoting in LCM's regular expressions, nor by
-  /// people.
+  /// Letters, digits and a few signs: names need no quoting in LCM's regular expressions or in a
+  /// shell.
   void check_channel(std::set<std::string>& seen, const std::string& key, const std::string& word,
                      const std::string& channel) const {
     const bool plain = std::all_of(word.begin(), word.end(), [](unsigned char c) {
@@ -240,7 +239,7 @@ class Checks {
     });
     require(plain, key, "letters, digits, _ - . /", in_quotes(word));
     require(channel.size() <= 63, key, "a channel of at most 63 characters", channel);
-    once(seen, channel, key, "a channel of its own",
+    once(seen, channel, key, "a separate channel",
          in_quotes(channel) + ", which another key names too");
   }
 
@@ -263,7 +262,7 @@ class Checks {
     const std::string example = ", such as udpm://239.255.76.67:7667?ttl=0";
     require(url.find("://") != std::string::npos, "daemon.lcm.url", "an LCM provider" + example,
             in_quotes(url));
-    // LCM takes a group without a port for port 0, where nobody hears another.
+    // LCM takes a group without a port as port 0, where no process receives from another.
     const std::string network = url.substr(0, url.find('?'));
     require(!network.starts_with("udpm://") || network == "udpm://" ||
                 network.find(':', 7) != std::string::npos,
@@ -273,7 +272,7 @@ class Checks {
   void check_valves() const {
     const ValveDriverSettings& it = experiment_.valves;
     const double max_bar = experiment_.actuation.max_pressure_bar;
-    // Arms that have no terminal need not fit into one.
+    // Arms without a terminal need not fit one.
     if (experiment_.actuation.kind == ActuationKind::torque || !keys_.given("valves")) return;
     std::set<int> seen;
     for (const int valve : it.order)

@@ -1,4 +1,4 @@
-// What no single key can be wrong about: consistency between keys.
+// Checks of consistency between keys.
 #pragma once
 
 #include "softarm/config/experiment.hpp"
@@ -6,7 +6,7 @@
 
 namespace softarm {
 
-/// @throws ConfigError at the key that is to be changed first.
+/// @throws ConfigError at the key to change first.
 void check_consistency(const Experiment& experiment, const Keys& reader);
 
 }  // namespace softarm

@@ -11,7 +11,7 @@
 
 namespace softarm {
 
-/// Declares a key that is named as the member of `it` that it sets.
+/// Declares a key with the name of the member of `it` that it sets.
 #define KEY(member, ...) key(#member, it.member, __VA_ARGS__)
 
 inline constexpr double kTwoPi = 6.283185307179586;
@@ -20,11 +20,11 @@ inline constexpr auto kRequired = Presence::required;
 
 void describe(Keys& key, Experiment& it);
 
-// Its parts, in files of their own.
+// Its parts, in separate files.
 void describe_daemon(Keys& key, Experiment& it);
 void describe(Keys& key, ValveDriverSettings& it);
 void describe_reference(Keys& key, ReferenceSettings& it);
-/// The simulated arm starts from what the controller's keys are.
+/// The simulated arm starts from the values of the controller's keys.
 void describe_plant(Keys& key, Experiment& experiment);
 /// Without required keys where the variables hold values of other sections.
 void describe_arm(Keys& key, ArmParameters& it, Presence presence);
@@ -32,7 +32,7 @@ void describe_actuation(Keys& key, ActuationSettings& it, Presence presence);
 /// A curvature of every segment, as `theta_rad` and `phi_rad` or as `u_rad`.
 void describe_pose(Keys& key, std::vector<double>& u_rad, Presence presence);
 
-/// A channel of section lcm, of at least so many characters.
+/// A channel of section lcm, with its minimum length in characters.
 struct ChannelKey {
   const char* name;
   std::string LcmSettings::*channel;

@@ -91,7 +91,7 @@ static void describe_integrator(Keys& key, PlantSettings& it) {
       "method of SUNDIALS: one-step and implicit (sdirk2, cash4, sdirk4) or explicit (erk), "
       "multistep (cvode_bdf)");
   if (key.reading() && it.method != IntegratorMethod::sdirk2) {
-    // Whoever chooses another method wants its accuracy.
+    // Another method is chosen for its accuracy.
     it.relative_tolerance = 1e-6;
     it.absolute_tolerance = 1e-8;
     it.max_step_s = 0.0;

@@ -11,7 +11,7 @@
 namespace softarm {
 namespace {
 
-/// Of two endings that fit, the first.
+/// Of two suffixes that match, the first counts.
 constexpr std::array kUnits = std::to_array<std::pair<std::string_view, std::string_view>>({
     {"_nm_per_rad_s", "N m/(rad s)"},
     {"_nm_per_rad3", "N m/rad^3"},
@@ -33,7 +33,7 @@ constexpr std::array kUnits = std::to_array<std::pair<std::string_view, std::str
     {"_n", "N"},
     {"_m", "m"},
     {"_s", "s"},
-    {"absolute_tolerance", "rad"},  // the one name that does not say its unit
+    {"absolute_tolerance", "rad"},  // the one name without its unit
 });
 
 std::string range_text(const Form& form) {

@@ -104,7 +104,8 @@ Json entry_schema(const Entry& entry, bool in_list, bool with_defaults) {
   for (const Entry& item : entry.entries)
     items.push_back(section_schema(item, true, with_defaults));
   Json list = {{"type", "array"}, {"minItems", 1}, {"items", any_of(items)}};
-  if (items.size() > 1) {  // the first key tells kinds apart: all its words, beside each kind's own
+  if (items.size() >
+      1) {  // the first key distinguishes the kinds: all its words, and each kind's own
     const Entry& kind = entry.entries.front().entries.front();
     list["items"]["properties"][kind.key.name] = value_schema(kind, false);
   }

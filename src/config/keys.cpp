@@ -31,7 +31,7 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
   return row.back();
 }
 
-/// Close enough that one may be the other misspelt, or with another unit.
+/// Whether one may be the other misspelt, or with another unit.
 bool similar(std::string_view a, std::string_view b) {
   constexpr std::size_t kLongestKey = 64;
   if (a.size() > kLongestKey) return false;
@@ -111,7 +111,7 @@ struct NumberReader {
 struct Keys::Frame {
   const YamlNode* node;
   std::string path;
-  std::set<std::string_view> known = {};    ///< keys asked for
+  std::set<std::string_view> known = {};    ///< keys declared
   std::optional<ConfigError> missing = {};  ///< the first
   std::string_view missing_key = {};
 
@@ -119,7 +119,7 @@ struct Keys::Frame {
     return path.empty() ? std::string(key) : fmt::format("{}.{}", path, key);
   }
 
-  /// Refuses keys that nobody asked for; all of them, or those that may be the missing key
+  /// Refuses keys that were not declared: all of them, or those that may be the missing key
   /// misspelt.
   void refuse_unknown(bool lookalikes_only) const {
     for (std::size_t i = 0; i < node->keys.size(); ++i) {
@@ -166,7 +166,7 @@ ConfigError Keys::error_at(const std::string& path, const std::string& expected,
   return {*where.file, where.line, path, expected, got};
 }
 
-/// What stands at a key of the section being read; nullptr where it is left out.
+/// The node of a key of the section being read; nullptr if it is left out.
 const YamlNode* Keys::take(const Key& key, const std::string& expected) {
   if (!reading()) return nullptr;
   Frame& frame = frames_.back();
@@ -183,7 +183,7 @@ const YamlNode* Keys::take(const Key& key, const std::string& expected) {
   return node;
 }
 
-/// Visits a section, whose keys become the entries of `out`; reading, that of `node`.
+/// Visits a section, whose keys become the entries of `out`; when reading, the section is `node`.
 void Keys::enter(Entry& out, const YamlNode* node, const std::string& path, const Body& body) {
   std::vector<Entry>* outer = std::exchange(entries_, &out.entries);
   if (!reading()) {
@@ -195,7 +195,7 @@ void Keys::enter(Entry& out, const YamlNode* node, const std::string& path, cons
     try {
       body();
     } catch (const ConfigError&) {
-      // The missing key is the likelier fault, and its misspelling likelier still.
+      // A missing key is the more likely fault, and its misspelling is more likely still.
       const Frame& frame = frames_[index];
       if (!frame.missing) throw;
       frame.refuse_unknown(true);

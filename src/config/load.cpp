@@ -13,14 +13,13 @@
 namespace softarm {
 namespace {
 
-/// One description reads and writes: what is printed is a copy.
+/// One description reads and writes, so printing visits a copy.
 Entry entries_of(Experiment experiment, Keys::Purpose purpose) {
   Keys keys(purpose);
   return keys.visit([&] { describe(keys, experiment); });
 }
 
-/// What the template shows where a key has no default: a short arm that goes through every kind of
-/// reference.
+/// The values of keys without a default in the template: a short arm with every kind of reference.
 Experiment example_experiment() {
   Experiment example;
   example.name = "my experiment";

@@ -8,9 +8,9 @@
 namespace softarm {
 namespace {
 
-constexpr int kMostIncludes = 8;  ///< of one another
+constexpr int kMostIncludes = 8;  ///< nested
 
-/// What stands behind "KEY:" in a line of YAML, or nothing.
+/// The value after "KEY:" in a line of YAML, or "".
 std::string value_of(const std::string& key, const std::string& line) {
   const std::size_t at = line.find(key + ":");
   if (at == std::string::npos || (at > 0 && std::strchr(" {,", line[at - 1]) == nullptr)) return "";
@@ -19,7 +19,7 @@ std::string value_of(const std::string& key, const std::string& line) {
   return line.substr(begin, line.find_first_of(" \"',}", begin) - begin);
 }
 
-/// These keys stand nowhere else in an experiment.
+/// These keys occur nowhere else in an experiment.
 void read(const std::filesystem::path& file, int includes_left, LcmSettings& lcm) {
   const std::pair<const char*, std::string*> keys[] = {{"url", &lcm.url},
                                                        {"operator_channel", &lcm.operator_channel},

@@ -1,4 +1,4 @@
-// What is made of the keys that were visited.
+// Output formats of the keys that were visited.
 #pragma once
 
 #include <string>
@@ -12,9 +12,9 @@ namespace softarm {
 std::string yaml_text(const Entry& root, bool documented);
 
 /// A JSON Schema (draft 7) by which editors complete and check a file. It accepts whatever is read
-/// without an error; what depends on several keys is for the reader alone. Keys are required only
+/// without an error; only the reader checks conditions across several keys. Keys are required only
 /// in files without `include`. `root` was visited for Keys::Purpose::schema with one item of every
-/// kind in lists, whose required words tell the kinds apart.
+/// kind in lists, whose required words distinguish the kinds.
 std::string json_schema_text(const Entry& root);
 
 }  // namespace softarm

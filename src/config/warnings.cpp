@@ -1,4 +1,4 @@
-// What is allowed but probably not meant.
+// Warnings about settings that are allowed but probably not intended.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -18,7 +18,8 @@
 namespace softarm {
 namespace {
 
-/// Can the chambers hold the poses of the reference, at rest, against stiffness and gravity?
+/// Checks whether the chambers can hold the poses of the reference at rest against stiffness and
+/// gravity.
 class StaticReach {
  public:
   explicit StaticReach(const Experiment& experiment)
@@ -70,7 +71,7 @@ class StaticReach {
   PressureAllocator allocator_;
 };
 
-/// What the configuration declares of the loop, whoever closes it.
+/// The control loop as the configuration declares it.
 LoopSampling sampling_of(const Experiment& experiment) {
   const SafetySettings& safety = experiment.safety;
   return {.control_period_s = 1.0 / experiment.rate_hz,

@@ -12,8 +12,8 @@ namespace {
 
 using Row = std::span<const double>;
 
-/// Numbers in as few as say the same: "0.5", "[1, 2]", "[[1, 0], [2, 0]]". fmt prints the shortest
-/// text that reads back as the same number.
+/// As few numbers as have the same meaning: "0.5", "[1, 2]", "[[1, 0], [2, 0]]". fmt prints the
+/// shortest text that reads back as the same number.
 std::string numbers_text(const Form& form, Row numbers) {
   const auto uniform = [](Row row) {
     return std::all_of(row.begin(), row.end(), [&](double x) { return x == row.front(); });
@@ -81,8 +81,8 @@ class Writer {
     }
   }
 
-  /// Indentation, and what makes a hint of a line that is not in force: "# " at the depth where
-  /// the hint starts.
+  /// Indentation, and for a hint that is not in force the comment mark: "# " at the depth where the
+  /// hint starts.
   std::string margin(int depth) const {
     if (!hint_depth_) return std::string(static_cast<std::size_t>(2 * depth), ' ');
     return fmt::format("{:{}}# {:{}}", "", 2 * *hint_depth_, "", 2 * (depth - *hint_depth_));

@@ -31,7 +31,7 @@ std::string quoted_excerpt(const std::string& text) {
   return out + (text.size() > kLength ? "...\"" : "\"");
 }
 
-/// Builds the tree from the parser's events, so that nothing yaml-cpp would forgive gets past.
+/// Builds the tree from the parser's events, so that errors which yaml-cpp tolerates are found.
 class TreeBuilder : public YAML::EventHandler {
  public:
   explicit TreeBuilder(FileName file) : file_(std::move(file)) {}
@@ -147,7 +147,7 @@ class TreeBuilder : public YAML::EventHandler {
     Level& level = levels_.back();
     if (level.node.kind == YamlNode::Kind::map) {
       child.key_location = level.key_location;
-      // The parser notices that there is no value only where the next line starts.
+      // The parser notices a missing value only at the start of the next line.
       if (child.kind == YamlNode::Kind::nothing) child.location = level.key_location;
     }
     level.node.items.push_back(std::move(child));

@@ -166,7 +166,7 @@ void ControlPipeline::watch(const TickInput& input, SafetyInput& safety) noexcep
     pressure_watch_.measure(*input.measured_bar);
   safety.pressure_mismatch = settings_.safety.valve_readback && pressure_watch_.strays();
   if (!curvature_watch_.used()) return;
-  // What is judged is the balance of an arm that is watched and told what to do.
+  // What is judged is the balance of an arm that is observed and commanded.
   const bool under_control = safety_.mode() == Mode::active || safety_.mode() == Mode::hold;
   if (under_control && !safety.motion_unknown) {
     allocator_.torque(previous_bar_, previous_tau_nm_);
@@ -188,7 +188,8 @@ void ControlPipeline::use_frame(const MocapFrame& frame) noexcept {
   const BodyPose& tip = frame.body[static_cast<std::size_t>(settings_.arm.size())];
   if (tip.valid) reference_.measure_tip(seconds(frame.capture_ns), tip.position_m);
 
-  // Under control the arm is expected to do what it is told; the filter then smooths only the rest.
+  // Under control the arm is expected to follow its commands; the filter then smooths only the
+  // deviation.
   const bool expects = safety_.mode() == Mode::active;
   if (expects) expect(frame.capture_ns);
   filter_.update(frame.capture_ns, estimate, expects ? &known_ : nullptr);

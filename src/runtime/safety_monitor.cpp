@@ -10,11 +10,11 @@
 namespace softarm {
 namespace {
 
-/// So long after a stop of the daemon what is handled may have been sent before its end: it queues
-/// in the kernel.
+/// For this long after a stop of the daemon, messages may have been sent before its end: they were
+/// queued in the kernel.
 constexpr std::int64_t kStale_ns = 500'000'000;
 
-/// Everything a cause may look at.
+/// Everything that a cause may depend on.
 struct Evidence {
   const SafetyInput& input;
   const SafetySettings& settings;
@@ -39,7 +39,7 @@ struct Cause {
   bool (*present)(const Evidence&);
 };
 
-/// Every cause, the most severe first: `shutdown` because nothing follows it, then by what they
+/// Every cause, the most severe first: `shutdown` because it is final, then by the mode they
 /// demand. Valves that are silent or do not follow are a fault where there is pressure; where there
 /// is none they only keep the arm from becoming active, so that valves may be switched on after the
 /// daemon. Overruns are ticks missed in a row, and judged only under SCHED_FIFO
@@ -99,7 +99,7 @@ constexpr auto kRules = [] {
   return rules;
 }();
 
-/// The values named may come off the wire.
+/// The value may come from a message.
 template <class Enumeration, std::size_t count>
 const char* name_of(Enumeration value, const std::array<const char*, count>& names) noexcept {
   const auto index = static_cast<std::size_t>(value);
@@ -162,8 +162,8 @@ SafetyMonitor::SafetyMonitor(const SafetySettings& settings, double control_peri
       armed_(settings.arming == Arming::automatic) {}
 
 /// LCM drops the newest messages when a queue is full: after a stop longer than valves may be
-/// silent their newest measurement looks old although they never were. Where nothing was heard
-/// since the stop before, another one changes nothing.
+/// silent their newest measurement looks old although they never were. If no measurement has
+/// arrived since the previous stop, another stop changes nothing.
 void SafetyMonitor::note_stop(const SafetyInput& input) noexcept {
   if (mode_ == Mode::init) return;
   const std::int64_t stopped_ns = input.now_ns - previous_tick_ns_;
@@ -194,8 +194,8 @@ CauseRule SafetyMonitor::worst_cause(const SafetyInput& input) const noexcept {
 }
 
 void SafetyMonitor::take_operator_requests(const SafetyInput& input, Mode demanded) noexcept {
-  // Armed is granted for what the operator sees now, never stored up for when a cause has gone, nor
-  // for what queued up in the kernel while we were stopped and comes in as if it were new.
+  // Arming applies to what the operator sees now. It is never kept until a cause is gone, and an
+  // `arm` queued in the kernel while the daemon was stopped, which looks new, does not count.
   if (input.requests.arm && demanded < Mode::vent && mode_ != Mode::fault &&
       input.now_ns >= deaf_until_ns_)
     armed_ = true;
@@ -203,8 +203,8 @@ void SafetyMonitor::take_operator_requests(const SafetyInput& input, Mode demand
 }
 
 void SafetyMonitor::enter(const CauseRule& cause) noexcept {
-  // With automatic arming a vent gives the arming back by itself, but not to an arm that ran beyond
-  // its limits (it would do so again and again), nor against a person's will.
+  // With automatic arming the arm stays armed after a vent, unless it exceeded its limits (it would
+  // do so again and again) or an operator disarmed it.
   if (cause.demands >= Mode::vent && cause.clearance != Clearance::good_frames) armed_ = false;
   mode_ = cause.demands;
   reason_ = cause.reason;
@@ -227,7 +227,7 @@ Mode SafetyMonitor::step(const SafetyInput& input) noexcept {
   note_stop(input);
   const CauseRule worst = worst_cause(input);
   take_operator_requests(input, worst.demands);
-  // In WAIT_FRAMES too, which such a cause does not leave.
+  // This applies in WAIT_FRAMES too, although such a cause does not change that mode.
   if (worst.demands >= Mode::vent && settings_.arming == Arming::explicit_) armed_ = false;
   previous_tick_ns_ = input.now_ns;
   if (mode_ == Mode::init) {
@@ -235,8 +235,9 @@ Mode SafetyMonitor::step(const SafetyInput& input) noexcept {
     reason_ = Reason::waiting_for_frames;
   }
 
-  // A run of good frames is one without a cause, a rejection, a gap or silent valves, and begins
-  // anew with the arm vented (until then it is moving), and when what queued up is through.
+  // A run of good frames is one without a cause, a rejection, a gap or silent valves, and starts
+  // again when the arm is vented (until then it is moving) and when queued messages have been
+  // handled.
   const bool still_venting = mode_ >= Mode::vent && !input.fully_vented;
   const bool unheard = settings_.valve_readback && listening_since_ns_ != kNever &&
                        input.newest_measurement_ns <= listening_since_ns_;
@@ -274,7 +275,7 @@ Mode SafetyMonitor::step(const SafetyInput& input) noexcept {
       break;
     case Mode::fault:
       // Disarming acknowledges a fault whose cause has gone; the arm stays vented until it is armed
-      // again. An emergency stop is told even where a fault came before it.
+      // again. An emergency stop is reported even if a fault came before it.
       if (worst.reason == Reason::emergency_stop || worst.clearance == Clearance::never ||
           (input.requests.disarm && worst.demands < Mode::fault))
         enter(worst);

@@ -23,9 +23,9 @@
 namespace softarm {
 namespace {
 
-/// A request must be complete so soon after its first byte.
+/// A request must be complete within this time after its first byte.
 constexpr std::uint32_t kRequest_us = 20'000;
-/// Who is turned away has to be accepted first.
+/// A client has to be accepted before it can be refused.
 constexpr int kBacklog = 64;
 constexpr int kHeader = 7;  // of Modbus TCP, before the function code
 
@@ -37,7 +37,7 @@ struct Request {
 
 int word_at(const std::uint8_t* bytes) { return bytes[0] << 8 | bytes[1]; }
 
-/// libmodbus checks less than what a stranger may send.
+/// libmodbus does not check everything that an unknown client may send.
 Request parse(const std::uint8_t* query, int size, const RegisterBank& bank) {
   Request request{.function = query[kHeader]};
   if (request.function != MODBUS_FC_READ_HOLDING_REGISTERS &&

@@ -57,7 +57,7 @@ bool SerialLine::open() noexcept {
 
 void SerialLine::close() noexcept {
   if (file_ < 0) return;
-  // Closing waits, for half a minute if need be, until a device has taken what was sent.
+  // Closing waits up to half a minute until the device has taken the data sent.
   const std::int64_t deadline_ns = monotonic_now_ns() + timeout_ns_;
   int unsent = 0;
   while (ioctl(file_, TIOCOUTQ, &unsent) == 0 && unsent > 0 && monotonic_now_ns() < deadline_ns)
@@ -79,7 +79,7 @@ LinkResult SerialLine::send(std::string_view text) noexcept {
   const ssize_t sent = ::write(file_, line.data(), static_cast<std::size_t>(wanted));
   if (sent == wanted) return LinkResult::ok;
   if (sent < 0 && errno == EAGAIN) return ended(LinkResult::no_answer, ETIMEDOUT);
-  // Half a line would corrupt the next one.
+  // A partial line would corrupt the next one.
   return ended(LinkResult::broken, sent < 0 ? errno : EIO);
 }
 

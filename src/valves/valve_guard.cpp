@@ -74,7 +74,8 @@ void ValveGuard::disconnect(ValveReason reason, std::int64_t now_ns) noexcept {
 }
 
 void ValveGuard::degrade(ValveReason reason, int chamber) noexcept {
-  // A stuck valve would be found only by raising the pressure once more: someone has to look first.
+  // A stuck valve would be found only by raising the pressure again, so an operator has to look
+  // first.
   if (settings_.wait_for_zero || reason == ValveReason::stuck_valve) wait_for_zero();
   if (state_ != ValveState::degraded) ++counters_.times_degraded;
   good_cycles_ = 0;
@@ -84,10 +85,10 @@ void ValveGuard::degrade(ValveReason reason, int chamber) noexcept {
 
 bool ValveGuard::wake(std::int64_t now_ns) noexcept {
   bool gap = woken_ns_ != kNever && now_ns - woken_ns_ > gap_ns_;
-  // However the time went by since the terminal answered last, it has vented by itself.
+  // The terminal has not answered for longer than its time-out, so it has vented by itself.
   gap |= state_ == ValveState::running && now_ns - answered_ns_ >= failsafe_ns_;
   woken_ns_ = now_ns;
-  // Without a connection no pressure is there to lose, and connecting itself takes time.
+  // Without a connection there is no pressure to lose, and connecting takes time.
   if (gap && (state_ == ValveState::running || state_ == ValveState::vented))
     degrade(ValveReason::time_gap, -1);
   return !gap;
@@ -115,7 +116,7 @@ void ValveGuard::wait_for_zero() noexcept {
 void ValveGuard::update_running(std::int64_t now_ns) noexcept {
   const bool commanded = !expiry_.vented();
   if (listening_since_ns_ == kNever) listening_since_ns_ = now_ns;
-  // What we could not hear is no silence of the controller.
+  // Commands that could not be received do not count as silence of the controller.
   const bool silent = !commanded && now_ns - listening_since_ns_ >= validity_ns_;
   if (silent || (commanded && expiry_.set_points_bar().maxCoeff() <= 0.0)) must_see_zero_ = false;
   if (state_ != ValveState::vented && state_ != ValveState::running) return;
@@ -174,7 +175,7 @@ void ValveGuard::secured(LinkResult result, bool as_written, std::int64_t now_ns
 }
 
 void ValveGuard::failed(LinkResult result, std::int64_t now_ns) noexcept {
-  // It may have been written although the answer is missing.
+  // It may have been written even if the answer is missing.
   if (set_points_bar_.maxCoeff() > 0.0) zero_confirmed_ = false;
   counters_.exceptions += result == LinkResult::exception_reply;
   counters_.no_answers += result == LinkResult::no_answer;
@@ -184,7 +185,7 @@ void ValveGuard::failed(LinkResult result, std::int64_t now_ns) noexcept {
   if (failures_++ == 0) failing_since_ns_ = now_ns;
   if (failures_ <= settings_.driver.tolerated_failures) return;
   if (result == LinkResult::no_answer) return disconnect(ValveReason::no_answer, now_ns);
-  // It answers, so zero may still reach it; a terminal that refuses that too is left to its own
+  // It answers, so zero may still reach it; a terminal that refuses zero too vents by its own
   // time-out.
   if (now_ns - failing_since_ns_ > kMostExceptions_ns)
     return disconnect(ValveReason::exception_reply, now_ns);
@@ -249,7 +250,7 @@ void ValveGuard::exchanged(LinkResult result, const ReadBack& read_back,
   }
   if (wrong != ValveReason::none) return degrade(wrong, chamber);
   if (state_ != ValveState::degraded) {
-    chamber_ = stuck;  // where stuck valves are only reported
+    chamber_ = stuck;  // if stuck valves are only reported
     return;
   }
   // A valve that was stuck has to follow again before it counts as good.

@@ -345,7 +345,7 @@ class Jog(unittest.TestCase):
         no_terminal = subprocess.run([PROGRAMS / "softarm", "jog", self.config, "1", "1", "0.1"], stdin=subprocess.DEVNULL,
                                      capture_output=True, text=True, check=False)
         self.assertEqual(no_terminal.returncode, 1)
-        self.assertIn("standard input is no terminal", no_terminal.stderr)
+        self.assertIn("standard input is not a terminal", no_terminal.stderr)
         self.arm.start("softarmd", "softarmd", self.config)
         jog = self.start("1", "1", "0.1")
         self.assertEqual(jog.wait(timeout=PATIENCE_S), 75)

@@ -1,4 +1,4 @@
-// What chambers do to the generalized force in u.
+// The input map: from chamber pressures to the generalized force in u.
 #pragma once
 
 #include <Eigen/Core>
@@ -7,12 +7,13 @@
 
 namespace softarm {
 
-/// Columns -g (cos chi, sin chi), one a chamber of one segment, N m per bar: f = columns p is the
-/// generalized force that pressures p (bar) add to that segment's u. With actuation by torque the
-/// columns of A_chamber (times the gains, 1 but for a mismatch), for p = tau_A.
+/// Input map of one segment, 2 x chambers, N m per bar, with columns -g (cos chi, sin chi): f = map
+/// p is the generalized force that pressures p (bar) add to that segment's u. With actuation by
+/// torque p is tau_A and the columns are those of A_chamber (times the gains, which are 1 unless
+/// the simulated arm has a mismatch).
 Eigen::Matrix2Xd input_map(ActuationKind kind, const std::vector<Chamber>& segment);
 
-/// Of the whole arm, 2n x chambers in the order of the valves: f = map p.
+/// Input map of the whole arm, 2n x chambers in the order of the valves: f = map p.
 Eigen::MatrixXd input_map(const ActuationSettings& settings);
 
 }  // namespace softarm

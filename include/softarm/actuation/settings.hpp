@@ -1,4 +1,4 @@
-// What an experiment says about the chambers of each segment and the limits of their valves.
+// Settings of actuation: the chambers of each segment and the limits of their valves.
 // config/template.yaml documents every setting.
 #pragma once
 
@@ -17,7 +17,7 @@ struct Chamber {
   bool operator==(const Chamber&) const = default;
 };
 
-/// What a command is made of.
+/// What a command consists of.
 enum class ActuationKind {
   chambers,  ///< pressures of chambers, in bar, none below zero
   torque     ///< tau_A itself, two signed moments (N m) about the local x and y axes a segment: for
@@ -25,7 +25,7 @@ enum class ActuationKind {
 };
 
 /// With `ActuationKind::torque` a segment has two "chambers" of gain 1, the moments about x and y;
-/// their angles mean nothing, and the limits are -max and max.
+/// their angles are not used, and the limits are -max and max.
 struct ActuationSettings {
   ActuationKind kind = ActuationKind::chambers;
   std::vector<std::vector<Chamber>>

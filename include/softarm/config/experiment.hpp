@@ -21,7 +21,7 @@ struct RunSettings {
   double log_rate_hz = 0.0;
 };
 
-/// An experiment as its file says it, defaults filled in.
+/// An experiment as in its file, defaults filled in.
 struct Experiment : PipelineSettings {
   std::string name;
   std::uint64_t seed = 1;

@@ -1,6 +1,5 @@
-// What an experiment says about `softarm identify`: the steps it plays, the limits it keeps, and
-// what it found beyond the controller's own model.
-// config/template.yaml documents every setting.
+// Settings of `softarm identify`: the steps it plays, its limits, and the terms it found beyond the
+// controller's model. config/template.yaml documents every setting.
 #pragma once
 
 #include <vector>
@@ -14,7 +13,7 @@ struct IdentificationSettings {
   double max_theta_rad = 1.5;
   double max_speed_radps = 20.0;
 
-  // Terms that the controller does not know, for predicting a recorded motion.
+  // Terms that the controller does not use, for predicting a recorded motion.
   std::vector<double> rest_u_rad;  ///< 2n: where the springs rest; empty: straight
   double cubic_nm_per_rad3 = 0.0;
   double lag_s = 0.0;

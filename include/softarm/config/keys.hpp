@@ -1,4 +1,4 @@
-// One declaration a key of a YAML document. It reads, prints, documents (template.yaml) and
+// One declaration per key of a YAML document. It reads, prints, documents (template.yaml) and
 // describes the key to editors (JSON Schema):
 //
 //   void describe(Keys& key, Motor& it) {
@@ -32,7 +32,7 @@ namespace softarm {
 
 struct YamlNode;
 
-/// Where something stands in a file.
+/// A location in a file.
 struct Location {
   std::shared_ptr<const std::string> file;
   int line = 0;  ///< 1-based
@@ -44,33 +44,34 @@ enum class Presence { optional, required };
 /// How a section is printed.
 enum class SectionKind {
   plain,
-  hint,       ///< its defaults follow from other keys: in the template a comment
-  input_only  ///< the same, and turned into values of other keys: not printed otherwise
+  hint,       ///< its defaults follow from other keys: a comment in the template
+  input_only  ///< the same, but converted to other keys: only in the template
 };
 
-/// What a key is called and means.
+/// Name and meaning of a key.
 struct Key {
   const char* name;
   const char* doc;
   Presence presence = Presence::optional;
   SectionKind kind = SectionKind::plain;
 
-  std::string_view unit() const;  ///< from the ending of the name; "" where there is none
+  std::string_view unit() const;  ///< from the suffix of the name; "" if it has none
 };
 
 /// A key with its value, as it was visited.
 struct Entry {
-  /// What is in it.
+  /// Type of the value.
   enum class Kind { numbers, text, section, list, one_or_each };
   Key key;
   Kind kind;
   Form form = {};
   std::vector<double> numbers = {};
   std::string text = {};
-  std::vector<Entry> entries = {};  ///< of a section; or the items, each a section
-  bool conditional = false;         ///< there under a condition only ...
-  bool in_force = true;             ///< ... that holds
+  std::vector<Entry> entries = {};  ///< keys of a section, or items, each a section
+  bool conditional = false;         ///< exists only under a condition ...
+  bool in_force = true;             ///< ... which is true
 
+  /// Whether the key must be in every file.
   bool required() const { return key.presence == Presence::required && !conditional; }
   /// "nominal, of the motion capture (a number in (0, 10] s)".
   std::string documentation() const;
@@ -79,31 +80,32 @@ struct Entry {
 /// Visits declarations for one purpose.
 class Keys {
  public:
-  /// What variables are visited for.
+  /// The purpose of a visit.
   enum class Purpose {
-    read,      ///< variables from a file
-    print,     ///< variables, in the form that is exact
-    document,  ///< variables, in the form that is friendly
-    schema     ///< all forms there are, under whatever condition
+    read,      ///< fill variables from a file
+    print,     ///< print variables in the exact form
+    document,  ///< print variables in the readable form
+    schema     ///< list all forms, whatever the conditions
   };
   using Body = std::function<void()>;
   using ItemBody = std::function<void(int)>;
 
+  /// Visits for any purpose but `read`.
   explicit Keys(Purpose purpose);
-  /// Reads a file with what it includes. @throws ConfigError
+  /// Reads a file and the files it includes. @throws ConfigError
   explicit Keys(const std::filesystem::path& file);
   ~Keys();
 
-  int segments = 1;  ///< of the arm, for keys behind `arm.segments`
+  int segments = 1;  ///< of the arm, for keys after `arm.segments`
 
-  /// Visits the keys that `describe` declares; reading, refuses all others. The result is a
-  /// section. @throws ConfigError, reading
+  /// Visits the keys that `describe` declares; when reading, refuses all others. Returns a section.
+  /// @throws ConfigError when reading
   Entry visit(const Body& describe);
-  /// Whether variables are being filled: then defaults may follow what was read before.
+  /// Whether variables are being filled from a file; defaults may then depend on keys read before.
   bool reading() const { return purpose_ == Purpose::read; }
-  /// Whether the file says anything at this path ("a.b[1].c").
+  /// Whether the file has a key at this path ("a.b[1].c").
   bool given(std::string_view path) const { return locations_.find(path) != locations_.end(); }
-  /// An error at a path, or at the nearest section around it that the file has.
+  /// An error at a path, located at the nearest enclosing section that is in the file.
   ConfigError error_at(const std::string& path, const std::string& expected,
                        const std::string& got) const;
 
@@ -115,6 +117,7 @@ class Keys {
     visit_numbers({name, doc, presence}, form, numbers);
     assign(value, numbers);
   }
+  /// A flag: false or true.
   void operator()(const char* name, bool& value, const char* doc) {
     (*this)(name, value, one_of({"false", "true"}), doc);
   }
@@ -128,6 +131,7 @@ class Keys {
                   SectionKind kind = SectionKind::plain) {
     section({name, doc, Presence::optional, kind}, [&] { describe(*this, value); });
   }
+  /// A section whose keys `body` visits.
   void section(const Key& key, const Body& body);
   /// A list of sections.
   template <typename Item, typename Describe>
@@ -145,9 +149,9 @@ class Keys {
     visit_one_or_each(key, static_cast<int>(items.size()), all_equal,
                       [&](int i) { describe_item(items[static_cast<std::size_t>(i)]); });
   }
-  /// Keys that are there under a condition only.
+  /// Keys that exist only under a condition.
   void when(bool condition, const Body& body);
-  /// Two ways to say the same.
+  /// Two alternative forms of the same value: a file may have one of them.
   void either(const char* exact, const Body& exact_body, const char* friendly,
               const Body& friendly_body);
 
@@ -162,7 +166,7 @@ class Keys {
   void enter(Entry& out, const YamlNode* node, const std::string& path, const Body& body);
   void enter_items(Entry& out, const YamlNode* list, int count, const ItemBody& item);
 
-  /// Matrices row by row.
+  /// The numbers of a value, matrices row by row.
   template <typename T>
   static std::vector<double> numbers_of(const T& value, Form& form) {
     if constexpr (std::is_arithmetic_v<T> || std::is_enum_v<T>) {

@@ -1,4 +1,4 @@
-// The network of a configuration that is wrong somewhere.
+// The LCM settings of a configuration that cannot be loaded.
 #pragma once
 
 #include <filesystem>
@@ -7,10 +7,10 @@
 
 namespace softarm {
 
-/// What can be read of daemon.lcm (url, operator_channel, status_channel) in a file that
-/// load_experiment refuses, or that is no YAML at all, and in what it includes; the rest by
-/// default. For requests that vent the arm, which a mistake in a file must not stop. Reads line by
-/// line; throws nothing for what it finds.
+/// The settings of daemon.lcm (url, operator_channel, status_channel) that can be found in a file
+/// that load_experiment refuses, even invalid YAML, and in the files it includes; defaults for the
+/// others. For requests that vent the arm: an error in a file must not prevent them. Reads line by
+/// line; no content of a file makes it throw.
 LcmSettings find_network(const std::filesystem::path& file);
 
 }  // namespace softarm

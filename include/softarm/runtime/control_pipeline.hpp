@@ -37,7 +37,7 @@ struct TickInput {
   std::span<const MocapFrame> frames;  ///< in order of arrival, capture times on our clock
   const LiveReferenceInput* reference = nullptr;  ///< the newest, if one came
   OperatorRequests requests = {};
-  bool command_expired = false;  ///< so long ago was one sent that the valves have vented meanwhile
+  bool command_expired = false;  ///< the last one sent has expired: the valves have vented
   int consecutive_overruns = 0;  ///< ticks missed in a row; zero where they are not to be judged
   /// Arrival of the newest pressure measurement, where the valves publish them.
   std::int64_t newest_measurement_ns = kNever;
@@ -76,14 +76,18 @@ struct TickOutput {
 /// allocates nothing and throws nothing after construction.
 class ControlPipeline {
  public:
-  /// @throws std::invalid_argument as the rooms it is made of, for settings that do not fit
-  /// together
+  /// @throws std::invalid_argument for settings that do not fit together, as the modules it is
+  /// composed of
   explicit ControlPipeline(const PipelineSettings& settings);
   ~ControlPipeline();
 
+  /// One tick: validate, estimate, safety, control (17), allocate, limit. To be called once per
+  /// period with increasing times; the result is valid until the next call.
   const TickOutput& tick(const TickInput& input) noexcept;
 
+  /// Result of the latest tick.
   const TickOutput& output() const noexcept { return output_; }
+  /// Frames accepted, rejected and missing since the start.
   const FrameCounters& counters() const noexcept { return validator_.counters(); }
   /// Dropped for their age: captured more than max_latency_s ago, or not yet.
   std::int64_t late_frames() const noexcept { return late_frames_; }
@@ -91,6 +95,7 @@ class ControlPipeline {
   const CurvatureEstimate& estimate() const noexcept { return validator_.estimate(); }
   /// Every commanded pressure is zero.
   bool fully_vented() const noexcept { return output_.pressure_bar.isZero(0.0); }
+  /// Period of the tick, 1/rate_hz.
   std::int64_t period_ns() const noexcept { return period_ns_; }
 
  private:

@@ -1,5 +1,5 @@
-// What an experiment may choose about the tick: its rate and the thresholds of the safety monitor.
-// config/template.yaml documents every setting.
+// Settings of the tick: its rate and the thresholds of the safety monitor. config/template.yaml
+// documents every setting.
 #pragma once
 
 #include "softarm/actuation/settings.hpp"
@@ -9,7 +9,7 @@
 
 namespace softarm {
 
-/// What it takes, besides good frames, before the arm is moved.
+/// What is required, besides good frames, before the arm may move.
 enum class Arming {
   automatic,  ///< ACTIVE as soon as good frames come (the simulated arm)
   explicit_   ///< waits for an operator's `arm`
@@ -35,12 +35,12 @@ struct SafetySettings {
   double curvature_settling_s = 0.5;
   bool deadman = false;  ///< there is a dead-man input
   double deadman_timeout_s = 0.2;
-  /// How long a command is valid: the valve side vents by itself when no newer one comes.
+  /// How long a command is valid: the valve side vents by itself unless a newer one arrives.
   double command_validity_s = 0.1;
 };
 
-/// Everything the pipeline of a tick is built from; an experiment adds the wire, the simulated arm
-/// and the run to it.
+/// Everything the control pipeline is built from; an experiment adds transport, simulated arm and
+/// run.
 struct PipelineSettings {
   ArmParameters arm;  ///< as the controller models it
   EstimationSettings estimation;

@@ -1,4 +1,4 @@
-// Lines of text over a serial device, for back ends of boards that speak them.
+// Lines of text over a serial device, for back ends of boards with a text protocol.
 #pragma once
 
 #include <array>
@@ -21,33 +21,36 @@ class SerialLine {
   SerialLine(const SerialLine&) = delete;
   SerialLine& operator=(const SerialLine&) = delete;
 
-  /// False: see `error`.
+  /// Opens the device. False: see `error`.
   bool open() noexcept;
-  /// What was sent last still goes out, as far as the time-out allows.
+  /// Closes the device. Data still queued is sent first, as far as the time-out allows.
   void close() noexcept;
+  /// Whether the device is open.
   bool is_open() const noexcept { return file_ >= 0; }
 
-  /// Sends `text` and a newline. What has arrived before is thrown away: an answer that came too
-  /// late would be taken for that to this line.
+  /// Sends `text` and a newline. Input received before is discarded: a late answer would be taken
+  /// for the answer to this line.
   LinkResult send(std::string_view text) noexcept;
-  /// The next line, without its end; valid until the next call. A longer one counts as no answer.
+  /// Receives the next line, without its line end; valid until the next call. A line longer than
+  /// kLongest counts as no answer.
   LinkResult receive(std::string_view& text) noexcept;
 
-  /// Why the last call failed; after a line was received: that it was not understood.
+  /// Reason of the last failure; after a line was received: that it was not understood.
   const char* error() const noexcept;
+  /// Path of the device.
   const std::string& device() const noexcept { return device_; }
 
  private:
   LinkResult ended(LinkResult result, int error) noexcept;
 
   std::string device_;
-  unsigned speed_;  ///< as termios counts it
+  unsigned speed_;  ///< termios constant of the baud rate
   long timeout_ns_;
   int file_ = -1;
   int error_ = 0;
   std::array<char, kLongest> received_;
   std::size_t size_ = 0;
-  std::size_t taken_ = 0;  ///< of `received_`, by the line before
+  std::size_t taken_ = 0;  ///< bytes of `received_` consumed by the previous line
 };
 
 }  // namespace softarm

@@ -1,6 +1,5 @@
-// What an experiment configures of the valves: what drives them, where the terminal is, its
-// registers, what counts as a fault.
-// config/template.yaml documents every setting.
+// Settings of the valves: the back end, the address of the terminal, its registers, and what counts
+// as a fault. config/template.yaml documents every setting.
 #pragma once
 
 #include <array>
@@ -9,13 +8,14 @@
 
 namespace softarm {
 
-/// Terminals whose registers are known from documents; none of them was tried on hardware.
+/// Terminals whose registers are known from their manuals; none of them was tested on hardware.
 enum class TerminalKind { cpx_vppm, cpx_vtem, cpx_e, cpx_ap, free };
 inline constexpr std::array<const char*, 5> kTerminalNames = {"cpx_vppm", "cpx_vtem", "cpx_e",
                                                               "cpx_ap", "free"};
 
-/// Where a terminal keeps what. Addresses are those of the protocol (what libmodbus takes), from 0.
-/// Valves stand in slots, `valves_per_slot` in each, their words side by side; -1 means "none".
+/// Register layout of a terminal. Addresses are those of the protocol (as libmodbus takes them),
+/// from 0. Valves are grouped in slots, `valves_per_slot` in each, their words adjacent; -1 means
+/// "none".
 struct RegisterMap {
   int write_address = 0;
   int write_words = 1;
@@ -41,8 +41,8 @@ struct RegisterMap {
 
 /// Settings of softarm-valves.
 struct ValveDriverSettings {
-  std::string backend = "modbus";  ///< what drives the valves: a name of valve_backend_names()
-  std::string device;              ///< what a back end that is not on a network opens
+  std::string backend = "modbus";  ///< one of valve_backend_names()
+  std::string device;              ///< opened by a back end that is not on a network
   std::string host = "127.0.0.1";
   int port = 502;
   int unit_id = 1;

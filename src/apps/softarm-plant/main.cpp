@@ -1,6 +1,6 @@
 // softarm-plant: the simulated arm in real time. Valve pressures in, motion-capture frames and
-// measured pressures out, in the messages the hardware speaks; with --modbus behind a valve
-// terminal's registers.
+// measured pressures out, in the messages of the hardware; with --modbus behind the registers of a
+// valve terminal.
 #include <fmt/format.h>
 
 #include <optional>
@@ -30,7 +30,7 @@ int serve(const std::string& path, const std::string& sensor_suffix,
     throw ConfigError(path, 0, "actuation.kind",
                       "chambers with --modbus: a terminal has valves, not moments", "torque");
   const InstanceLock lock(lock_name(lcm.mocap_channel, lcm.url));
-  // With softarm-valves there, measured pressures are its to publish.
+  // With --modbus, softarm-valves publishes the measured pressures.
   std::optional<InstanceLock> measurement_lock;
   if (!by_torque && !modbus_port)
     measurement_lock.emplace(lock_name(lcm.measurement_channel, lcm.url));
@@ -60,7 +60,7 @@ int main(int argc, char** argv) {
       ->type_name("PORT");
   app.add_option("--sensor-suffix", sensor_suffix,
                  "of the channels for motion capture and measured pressures: with _CLEAN, "
-                 "softarm-dev fault stands between them and softarmd");
+                 "softarm-dev fault can pass them on to softarmd");
   return softarm::run_program(argc, argv, app,
                               [&] { return softarm::serve(config, sensor_suffix, modbus_port); });
 }

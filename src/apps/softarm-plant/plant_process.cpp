@@ -16,8 +16,8 @@ namespace softarm {
 namespace {
 
 constexpr int kCommandCapacity = 64;
-/// What the arm catches up with after a stall. Beyond that its time stands still, or a machine that
-/// is too slow would fall behind further with every step.
+/// The longest stall that the arm catches up with. For the rest its time stands still: otherwise a
+/// machine that is too slow would fall further behind with every step.
 constexpr std::int64_t kMostBehind_ns = 250'000'000;
 
 }  // namespace
@@ -26,7 +26,7 @@ PlantProcess::PlantProcess(const Experiment& experiment, std::optional<int> modb
     : lcm_(experiment.transport.lcm),
       mocap_(experiment.transport, experiment.plant.arm),
       node_(lcm_.url),
-      // Registers hold until the terminal's own time-out, and for ever without one.
+      // Registers hold until the terminal's own time-out, or without limit if it has none.
       arm_(experiment.plant, monotonic_now_ns(),
            modbus_port ? kForever : to_ns(experiment.safety.command_validity_s)),
       by_torque_(experiment.plant.actuation.kind == ActuationKind::torque),
@@ -63,14 +63,15 @@ void PlantProcess::run() {
 
 void PlantProcess::take_commands(std::int64_t deadline_ns) {
   if (!node_.wait_until(deadline_ns)) return;
-  // All that came meanwhile: a full queue would keep the oldest commands and drop the newest.
+  // All messages that came meanwhile: a full queue would keep the oldest commands and drop the
+  // newest.
   int taken = 0;
   do {
     if (std::exchange(command_received_, false)) take_command();
   } while (++taken < kCommandCapacity && node_.drain(1) > 0);
 }
 
-/// What is written holds until the terminal's own time-out, counted from the last request.
+/// Written set points hold until the terminal's time-out, counted from the last request.
 void PlantProcess::serve_requests(std::int64_t deadline_ns) {
   if (!modbus_->server.wait_until(deadline_ns)) return;
   advance();
@@ -86,7 +87,7 @@ void PlantProcess::serve_requests(std::int64_t deadline_ns) {
                arm_now_ns());
 }
 
-/// The arm's own time: the monotonic clock without what was lost.
+/// The arm's time: the monotonic clock minus the time lost in stalls.
 std::int64_t PlantProcess::arm_now_ns() {
   const std::int64_t now_ns = monotonic_now_ns() - lost_ns_;
   const std::int64_t excess_ns = now_ns - arm_.time_ns() - kMostBehind_ns;

@@ -20,7 +20,7 @@
 
 namespace softarm {
 
-/// A valve terminal in front of the arm, polled by the plant's own loop.
+/// A valve terminal in front of the arm, polled by the loop of the plant.
 struct ModbusSide {
   ModbusSide(const ValveDriverSettings& valves, int port)
       : server(port), terminal(valves.registers, valves.order) {}
@@ -30,14 +30,14 @@ struct ModbusSide {
   std::int64_t sequence = 0;
 };
 
-/// Belongs to one thread. Prints what happens to the arm on stderr.
+/// Belongs to one thread. Prints events of the arm on stderr.
 class PlantProcess {
  public:
-  /// @param modbus_port of a valve terminal to serve at 127.0.0.1 (0: any); none: commands come
-  /// over LCM @throws TransportError, std::runtime_error if the port cannot be served
+  /// @param modbus_port port of a valve terminal to serve at 127.0.0.1 (0: any); none: commands
+  /// come over LCM @throws TransportError, std::runtime_error if the port cannot be served
   PlantProcess(const Experiment& experiment, std::optional<int> modbus_port);
 
-  /// Until a stop was requested.
+  /// Runs until a stop is requested.
   void run();
 
  private:

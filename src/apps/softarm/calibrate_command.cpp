@@ -1,5 +1,5 @@
-// softarm calibrate: looks at an arm that hangs still and finds where on its marker plates the
-// frames of the segments sit.
+// softarm calibrate: observes an arm at rest and finds the marker frames: the poses of the
+// segments' frames on their marker bodies.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -33,7 +33,7 @@ struct CalibrateOptions {
   BaseSource base = BaseSource::plate;
 };
 
-/// Body poses: what the source sends, in our world, without plates.
+/// Body poses: as the source sends them, in our world, without the configured marker frames.
 Experiment without_plates(Experiment experiment) {
   const auto clear = [](PlateSettings& plate) {
     plate.position_m.setZero();
@@ -88,15 +88,15 @@ int calibrate(const CalibrateOptions& options) {
   const RestCalibration found = calibrate_rest(experiment, frames, options.base);
   fmt::print("{}", calibration_text(experiment, found));
   if (options.output.empty()) return kExitOk;
-  const std::string note =
-      fmt::format("Where S_i sits on the marker plates: softarm calibrate {}, {} frames at rest.",
-                  version_text(), found.body.back().frames);
+  const std::string note = fmt::format(
+      "Marker frames, S_i on the marker bodies: softarm calibrate {}, {} frames at rest.",
+      version_text(), found.body.back().frames);
   const fs::path folder = fs::absolute(options.output).parent_path();
   write_text(options.output,
              calibrated_yaml(experiment, found, note,
                              fs::proximate(fs::absolute(options.config), folder).string()));
   load_experiment(options.output);
-  fmt::print("{} has the plates: softarm check {}\n", options.output, options.output);
+  fmt::print("{} has the marker frames: softarm check {}\n", options.output, options.output);
   return kExitOk;
 }
 
@@ -104,18 +104,18 @@ int calibrate(const CalibrateOptions& options) {
 
 void add_calibrate_command(CLI::App& app) {
   auto* command = app.add_subcommand(
-      "calibrate", "finds the marker plates' transforms from an arm that hangs still, over LCM");
+      "calibrate", "finds the marker frames' transforms from an arm that hangs still, over LCM");
   auto options = std::make_shared<CalibrateOptions>();
   command->add_option("CONFIG", options->config, "experiment in YAML")->required();
   command->add_option("--duration", options->duration_s, "how long to look, in s (default 5)")
       ->check(positive_seconds());
   command->add_option("-o,--output", options->output,
-                      "write an experiment that includes CONFIG and has the plates found");
+                      "write an experiment that includes CONFIG and has the marker frames found");
   command
       ->add_option(
           "--base", options->base,
-          "what tells where the arm's axis points at the base: its plate as configured, or "
-          "arm.base.rotation")
+          "source of the arm's axis at the base: its marker frame as configured (plate), or "
+          "arm.base.rotation (arm)")
       ->transform(CLI::CheckedTransformer(std::map<std::string, BaseSource>{
           {"plate", BaseSource::plate}, {"arm", BaseSource::arm}}));
   command->callback([options] {

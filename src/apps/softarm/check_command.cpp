@@ -1,5 +1,5 @@
-// softarm check: is this configuration right, and what does it say in full? With --live: does the
-// arm that is running fit it?
+// softarm check: checks a configuration and prints it in full. With --live: checks whether the
+// running arm fits it.
 #include <fmt/format.h>
 
 #include <memory>

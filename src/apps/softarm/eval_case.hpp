@@ -1,4 +1,4 @@
-// What `softarm eval` reads.
+// The input of `softarm eval`.
 #pragma once
 
 #include <string>

@@ -32,7 +32,7 @@ MotionRecord play(const Experiment& experiment, const IdentifyCommand& command) 
   const LiveOutcome outcome = play_steps(
       experiment, command.plan, [] { return stop_requested != 0; },
       [&](const std::string& text) { progress.update(text); });
-  release_stop_signals();  // nothing moves any more
+  release_stop_signals();  // the arm no longer moves
   if (!outcome.aborted.empty())
     throw std::runtime_error("vented, nothing identified: " + outcome.aborted);
   return outcome.record;
@@ -74,7 +74,7 @@ void write_findings(const Experiment& experiment, const IdentifyCommand& command
     const std::filesystem::path folder(command.out);
     std::filesystem::create_directories(folder);
     write_text(folder / "identification.csv", residuals_csv(fit));
-    fmt::print("{} has what was measured and simulated: tools/plot_identification.py {}\n",
+    fmt::print("{} has the measured and simulated motion: tools/plot_identification.py {}\n",
                (folder / "identification.csv").string(), command.out);
   }
   if (command.output.empty()) return;
@@ -88,7 +88,7 @@ void write_findings(const Experiment& experiment, const IdentifyCommand& command
   write_text(command.output, identified_yaml(experiment, set.arm(fit.x), command.choice, note,
                                              command.config, command.output));
   load_experiment(command.output);
-  fmt::print("{} has them: softarm run {}\n", command.output, command.output);
+  fmt::print("{} has the values found: softarm run {}\n", command.output, command.output);
 }
 
 int identify(IdentifyCommand& command) {
@@ -101,7 +101,7 @@ int identify(IdentifyCommand& command) {
   command.choice.damping = !command.no_damping;
   command.choice.inertia = !command.no_inertia;
   if (command.coverage) return print_coverage(experiment, command);
-  // Told before the arm moves, not after.
+  // Checked before the arm moves, not after.
   const auto folder = (std::filesystem::path(".") / command.output).parent_path();
   if (!std::filesystem::is_directory(folder)) {
     print_error("softarm", fmt::format("--output: there is no folder {}", folder.string()));

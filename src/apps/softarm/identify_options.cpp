@@ -42,20 +42,20 @@ void add_choice_options(CLI::App& command, IdentifyCommand& options) {
                                                       {"chamber", GainSharing::chamber}};
   command
       .add_option("--gains", options.choice.gains,
-                  "gains of their own for: arm, side, segment or (default) chamber")
+                  "separate gains for each: arm, side, segment or (default) chamber")
       ->transform(CLI::CheckedTransformer(sharing));
   command.add_flag("--no-stiffness", options.no_stiffness,
-                   "k as configured: for slow motion, which tells ratios only");
+                   "k as configured: for slow motion, which determines ratios only");
   command.add_flag("--no-damping", options.no_damping, "beta as configured");
   command.add_flag("--no-inertia", options.no_inertia,
                    "leave inertia out, for motions so slow that it does not count: much quicker "
                    "where beta is large");
   command.add_flag("--no-lag", options.no_lag, "the lag is identification.lag_s");
   command.add_flag("--no-delay", options.no_delay, "the delay is identification.delay_s");
-  command.add_flag("--rest", options.choice.rest, "seek where the springs rest");
-  command.add_flag("--cubic", options.choice.cubic, "seek a cubic stiffness");
+  command.add_flag("--rest", options.choice.rest, "fit the rest shape of the springs");
+  command.add_flag("--cubic", options.choice.cubic, "fit a cubic stiffness");
   command.add_flag("--directions", options.choice.directions,
-                   "seek the direction into which every chamber pushes");
+                   "fit the direction in which every chamber bends its segment");
   command
       .add_option("--prior", options.options.refinement.prior,
                   "how far, in parts of it, every number may be off what is configured (one "
@@ -76,9 +76,9 @@ void add_identify_options(CLI::App& command, IdentifyCommand& options) {
   command.add_flag("--linear", options.linear,
                    "linear least squares alone: quick, biased by noise and smoothing");
   command.add_flag("--predict", options.predict,
-                   "identify nothing: how well does CONFIG predict the motion?");
+                   "identify nothing, but print how well CONFIG predicts the motion");
   command.add_flag("--compare", options.compare,
-                   "what each term more buys, on the whole record and from half to half");
+                   "what each further term gains, on the whole record and from half to half");
   command.add_option("--hold", options.plan.hold_s, "time between steps in s")
       ->check(number_between(0.1, 100.0));
   command

@@ -1,4 +1,4 @@
-// softarm jog: one chamber by hand, for as long as a key is held.
+// softarm jog: fills one chamber while a key is held.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -18,7 +18,7 @@
 namespace softarm {
 namespace {
 
-constexpr double kListen_s = 0.5;  ///< for others, before the first command
+constexpr double kListen_s = 0.5;  ///< for other senders, before the first command
 constexpr std::int64_t kFrameCounts_ns = 200'000'000;
 constexpr int kQuit = 'q';
 
@@ -28,7 +28,7 @@ struct JogOptions {
   double pressure_bar = 0.0;
 };
 
-/// What is wrong with the request; empty where nothing is.
+/// The fault of the request; empty if it has none.
 std::string refusal(const Experiment& experiment, const JogOptions& options) {
   const ActuationSettings& actuation = experiment.actuation;
   if (actuation.kind == ActuationKind::torque)
@@ -82,7 +82,7 @@ class Jog {
     std::int64_t before_ns = client_.now_ns();
     while (stop_requested == 0) {
       const std::int64_t now_ns = client_.now_ns();
-      // Keys that queued up while we were held up (Ctrl-Z, fg) are not being held.
+      // Keys queued while the program was stopped (Ctrl-Z, fg) are not being held.
       if (now_ns - std::exchange(before_ns, now_ns) > KeyHold::kNext_ns) terminal.begin_anew();
       const int key = terminal.key();
       if (key == kQuit || key == RawTerminal::kGone) return;

@@ -1,4 +1,4 @@
-// Is a key being held? A terminal only tells that it repeats.
+// Detects whether a key is held: a terminal only reports that it repeats.
 #pragma once
 
 #include <cstdint>
@@ -7,8 +7,8 @@
 
 namespace softarm {
 
-/// Held from the first event until the repeats stay away. Keyboards repeat after 0.25 to 0.7 s for
-/// the first time and then 10 to 30 times a second, so the first wait is longer.
+/// Held from the first event until the repeats end. Keyboards repeat after 0.25 to 0.7 s for the
+/// first time and then 10 to 30 times a second, so the first wait is longer.
 class KeyHold {
  public:
   static constexpr std::int64_t kFirst_ns = 750'000'000;

@@ -33,7 +33,7 @@ int pulse(const LiveCheckOptions& options, ArmClient& client, Observer& observer
   const Experiment& experiment = client.experiment();
   std::string other = client.other_commander();
   if (other.empty() && observer.seen().commanded_by_others)
-    other = "somebody commanded pressures on " + experiment.transport.lcm.command_channel;
+    other = "another program commanded pressures on " + experiment.transport.lcm.command_channel;
   const std::vector<Finding> at_rest = preflight(experiment, observer.seen());
   if (!other.empty()) {
     print(at_rest, options.json);
@@ -42,8 +42,9 @@ int pulse(const LiveCheckOptions& options, ArmClient& client, Observer& observer
   }
   if (const std::string obstacle = obstacle_to_pulses(at_rest); !obstacle.empty()) {
     print(at_rest, options.json);
-    print_error("softarm",
-                "no chamber was filled: without these nobody would watch its limits: " + obstacle);
+    print_error(
+        "softarm",
+        "no chamber was filled: its limits could not be watched without these: " + obstacle);
     return kExitFailure;
   }
   say("softarm check: filling every chamber softly, one after the other: THE ARM MOVES. Ctrl-C "
@@ -78,7 +79,7 @@ int check_live(const Experiment& experiment, const LiveCheckOptions& options) {
   catch_stop_signals();
   ignore_broken_pipes();
   ArmClient client(experiment);
-  // First of all: nobody may begin to command while we listen.
+  // First of all, so that no other program begins to command while this one listens.
   if (options.pulse) client.lock_commands();
   Observer observer(client);
   Progress progress(!options.json);

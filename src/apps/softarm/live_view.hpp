@@ -10,12 +10,12 @@
 
 namespace softarm {
 
-/// Everything at a glance: redrawn in place, and left standing at the end.
+/// The state of the arm: redrawn in place, and left on the screen at the end.
 class LiveView {
  public:
   explicit LiveView(const Experiment& experiment) : experiment_(experiment) {}
 
-  /// There is a terminal, and it is time to draw.
+  /// Whether there is a terminal, and it is time to draw.
   bool due() const;
   void draw(const StatusRecord& record);
 

@@ -1,4 +1,4 @@
-// softarm arm, disarm, estop, deadman: what a person asks of a running daemon.
+// softarm arm, disarm, estop, deadman: requests of an operator to a running daemon.
 #include <fmt/format.h>
 
 #include <cstdio>
@@ -16,7 +16,7 @@
 namespace softarm {
 namespace {
 
-/// One request, as a person gives it.
+/// One request of an operator.
 struct Kind {
   OperatorRequest request;
   const char* command;
@@ -33,7 +33,7 @@ constexpr Kind kKinds[] = {
      "stopped"},
 };
 
-/// Whoever wants the arm vented must not be kept from it by a typo in a file.
+/// A typing error in a file must not prevent a request that vents the arm.
 LcmSettings network_of(const std::string& config, const Kind& kind) {
   try {
     return load_experiment(config).transport.lcm;
@@ -41,7 +41,7 @@ LcmSettings network_of(const std::string& config, const Kind& kind) {
     if (kind.request == OperatorRequest::arm || !std::filesystem::is_regular_file(config)) throw;
     print_error("softarm", error.what());
     const LcmSettings lcm = find_network(config);
-    say(fmt::format("softarm: {} all the same, on {} of {}, if that is your daemon's network\n",
+    say(fmt::format("softarm: {} anyway, on {} of {}, if that is your daemon's network\n",
                     kind.command, lcm.operator_channel, lcm.url));
     return lcm;
   }
@@ -70,7 +70,7 @@ int request(const std::string& config, const Kind& kind) {
   return kExitFailure;
 }
 
-/// Sends "go" ten times in every time-out until it is interrupted, then that it is taken back.
+/// Sends "go" ten times in every time-out until it is interrupted, then withdraws it.
 int hold_deadman(const std::string& config) {
   const Experiment experiment = load_experiment(config);
   const std::string& channel = experiment.transport.lcm.deadman_channel;
@@ -83,7 +83,7 @@ int hold_deadman(const std::string& config) {
   catch_stop_signals();
   OperatorClient client(experiment.transport.lcm);
   const double period_s = 0.1 * experiment.safety.deadman_timeout_s;
-  fmt::print("saying go on {} every {:.3g} s until Ctrl-C\n", channel, period_s);
+  fmt::print("sending go on {} every {:.3g} s until Ctrl-C\n", channel, period_s);
   std::fflush(stdout);
   do {
     client.send_go(true);
@@ -108,7 +108,7 @@ void add_operator_commands(CLI::App& app) {
   for (const Kind& kind : kKinds)
     add(app, kind.command, kind.help,
         [&kind](const std::string& config) { return request(config, kind); });
-  add(app, "deadman", "Say go on the dead-man channel until interrupted", hold_deadman);
+  add(app, "deadman", "Send go on the dead-man channel until interrupted", hold_deadman);
 }
 
 }  // namespace softarm

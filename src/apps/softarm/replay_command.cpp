@@ -1,4 +1,4 @@
-// softarm replay: does the pipeline say again, bit for bit, what a log says it said?
+// softarm replay: checks that the pipeline gives again, bit for bit, what a log recorded of it.
 #include <fmt/format.h>
 
 #include <filesystem>
@@ -66,7 +66,7 @@ std::string json_report(const ReplaySummary& summary, const EventLogReader& log)
       {"recorded_build", summary.recorded_build},
       {"same_build", !summary.other_build},
       {"first_difference", summary.different() ? json_of(summary.first) : Json(nullptr)}};
-  // What was recorded may be any bytes.
+  // The record may contain any bytes.
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
@@ -122,8 +122,8 @@ void add_replay_command(CLI::App& app) {
   auto options = std::make_shared<ReplayOptions>();
   CLI::App* command = app.add_subcommand(
       "replay",
-      "Run the pipeline on what a log of lcm-logger recorded; is every command the same?");
-  command->add_option("LOG", options->log, "log of lcm-logger, with what the daemon said")
+      "Run the pipeline again on a log of lcm-logger, and check that every command is the same");
+  command->add_option("LOG", options->log, "log of lcm-logger, with the daemon's messages")
       ->required();
   command->add_option("CONFIG", options->config, "the daemon's configuration")->required();
   command->add_flag("--any-configuration", options->any_configuration,

@@ -1,4 +1,4 @@
-// softarm report: what a recorded LCM log (lcm-logger) tells of a run, in the same files and plots
+// softarm report: evaluates a recorded LCM log (lcm-logger) of a run, with the same files and plots
 // as `softarm run`.
 #include <fmt/format.h>
 
@@ -40,7 +40,7 @@ int report(const ReportOptions& options) {
   record.close();
   if (record.rows() == 0) {
     print_error("softarm", fmt::format("{} holds no status of an arm of {} segments on channel {}; "
-                                       "daemon.lcm.status_channel says which to look for",
+                                       "daemon.lcm.status_channel is the one expected",
                                        options.log, experiment.arm.size(),
                                        experiment.transport.lcm.status_channel));
     return kExitData;
@@ -48,7 +48,7 @@ int report(const ReportOptions& options) {
   if (record.status().configuration_hash != experiment.hash) {
     say(fmt::format(
         "softarm: warning: the log was made with configuration {:016x}, {} is {:016x}: what the "
-        "report takes from the configuration may not be what was in force\n",
+        "report takes from the configuration may differ from what was in force\n",
         record.status().configuration_hash, options.config, experiment.hash));
   }
   fmt::print("{}log, summary and timing are in {}\n", record.table(), options.out);

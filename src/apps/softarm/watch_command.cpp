@@ -1,4 +1,4 @@
-// softarm watch: looks at a running arm over LCM, and records it in the same files as `softarm
+// softarm watch: observes a running arm over LCM, and records it in the same files as `softarm
 // run`.
 #include <fmt/format.h>
 #include <unistd.h>
@@ -18,7 +18,7 @@
 namespace softarm {
 namespace {
 
-constexpr std::int64_t kSilence_ns = 10'000'000'000;  ///< without any status: nobody is there
+constexpr std::int64_t kSilence_ns = 10'000'000'000;  ///< without any status: no daemon is running
 
 struct WatchOptions {
   std::string config;
@@ -26,7 +26,7 @@ struct WatchOptions {
   double duration_s = 0.0;
 };
 
-/// One line, for where there is no terminal.
+/// One line, for output that is not a terminal.
 std::string progress_text(const StatusRecord& record, double duration_s) {
   const ArmStatus& status = record.status();
   std::string text = fmt::format("{:6.1f} s {:<11} frame age {:4.1f} ms ", record.time_s(),
@@ -69,8 +69,8 @@ int watch(const WatchOptions& options) {
     if (options.duration_s > 0.0 && record.rows() > 0 && record.status().mode == Mode::fault) {
       print_error(
           "softarm",
-          fmt::format("the arm is in FAULT ({}) after {:.1f} of {:.1f} s of ACTIVE: mend what is "
-                      "wrong, `softarm disarm` and `softarm arm`, then watch again",
+          fmt::format("the arm is in FAULT ({}) after {:.1f} of {:.1f} s of ACTIVE: fix the "
+                      "cause, `softarm disarm` and `softarm arm`, then watch again",
                       name(record.status().reason), record.active_s(), options.duration_s));
       record.close();
       return kExitFailure;

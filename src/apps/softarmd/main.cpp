@@ -41,7 +41,7 @@ void print_summary(const DaemonLoop& loop) {
 
 /// Prints every change of mode or reason, and what was refused; reports to the service manager.
 void run(DaemonLoop& loop, LineLog& log, ServiceNotifier& service) {
-  constexpr std::int64_t kRefused_ns = 1'000'000'000;  // malformed messages come at any rate
+  constexpr std::int64_t kRefused_ns = 1'000'000'000;  // malformed messages may come at any rate
   Mode mode = Mode::init;
   Reason reason = Reason::none;
   std::int64_t refused = 0, refused_reported_ns = kNever;
@@ -86,11 +86,12 @@ int serve(const std::string& path, bool shadow) {
     say(fmt::format("softarmd: warning: {}\n", warning));
   ServiceNotifier service;
   if (!service.problem().empty()) say(fmt::format("softarmd: warning: {}\n", service.problem()));
-  // A thread inherits the scheduling in force when it starts. The one that prints gets none of it;
-  // LCM's receive thread stays one below the tick, which a flood of messages would else starve.
+  // A thread inherits the scheduling in force when it starts. The printing thread gets none of it;
+  // LCM's receive thread stays one below the tick, which a flood of messages would otherwise
+  // starve.
   LineLog log("softarmd", say);
-  // The tick's own priority is asked for first, and its refusal told: whatever is refused later is
-  // the same, or less was asked for.
+  // The tick's priority is requested first and its refusal is reported: a later refusal has the
+  // same cause, or is for a lower priority.
   const RealtimeSettings& realtime = experiment.realtime;
   for (const std::string& refused : apply_realtime_settings(realtime))
     say(fmt::format("softarmd: warning: {}\n", refused));

@@ -132,7 +132,7 @@ TEST_F(Driver, PressuresThatAreNoNumbersAreNoAnswer) {
   EXPECT_TRUE(vented());
   EXPECT_EQ(driver->guard().state(), ValveState::disconnected);
   EXPECT_EQ(driver->guard().counters().no_answers, 3);
-  EXPECT_EQ(text(), "DISCONNECTED (no answer in time): nowhere: pressures that are no numbers");
+  EXPECT_EQ(text(), "DISCONNECTED (no answer in time): nowhere: pressures that are not numbers");
 }
 
 // The clock is asked again after the decision: hardware that has vented meanwhile gets zero.
