@@ -1,5 +1,5 @@
-// What an experiment says about `softarm identify`: the steps it plays, the limits it keeps, and
-// what it found beyond the controller's own model.
+// What an experiment says about `softarm identify`: the steps it plays, and what it found beyond the
+// controller's own model.
 // config/template.yaml documents every setting.
 #pragma once
 
@@ -11,8 +11,6 @@ namespace softarm {
 struct IdentificationSettings {
   std::vector<double> steps_bar = {0.2, 0.4, 0.6};
   double hold_s = 2.0;
-  double max_theta_rad = 1.5;
-  double max_speed_radps = 20.0;
 
   // Terms that the controller does not know, for predicting a recorded motion.
   std::vector<double> rest_u_rad;  ///< 2n: where the springs rest; empty: straight
