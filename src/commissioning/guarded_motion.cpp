@@ -5,7 +5,7 @@
 namespace softarm {
 
 std::string GuardedMotion::reason_to_end() const {
-  const IdentificationSettings& limits = client_.experiment().identification;
+  const MotionLimits& limits = client_.experiment().motion_limits;
   const SeenArm& seen = client_.seen();
   if (stop_ && stop_()) return "stopped";
   if (client_.held_up()) return ArmClient::kHeldUp;

@@ -156,12 +156,14 @@ static void describe(Keys& key, RunSettings& it) {
   KEY(log_rate_hz, from(0, 1e4), "rows of log.csv, from which errors are taken; 0: every tick");
 }
 
-static void describe(Keys& key, IdentificationSettings& it) {
+static void describe_identification(Keys& key, IdentificationSettings& it, MotionLimits& limits) {
   it.rest_u_rad.resize(static_cast<std::size_t>(2 * key.segments), 0.0);
   KEY(steps_bar, above(0, 100).list(), "pressures of the steps, on every side in turn");
   KEY(hold_s, from(0.1, 100), "from step to step");
-  KEY(max_theta_rad, above(0, kTwoPi), "a segment that bends farther ends the experiment");
-  KEY(max_speed_radps, above(0, 1e4), "a segment that moves faster ends the experiment");
+  key("max_theta_rad", limits.max_theta_rad, above(0, kTwoPi),
+      "a segment that bends farther ends the experiment");
+  key("max_speed_radps", limits.max_speed_radps, above(0, 1e4),
+      "a segment that moves faster ends the experiment");
   KEY(rest_u_rad, from(-kTwoPi, kTwoPi).one_or_pairs(),
       "where the springs rest, to predict a recorded motion; the controller does not know it");
   KEY(cubic_nm_per_rad3, from(-1e4, 1e4), "likewise: adds c |u - rest|^2 (u - rest) to K u");
@@ -193,7 +195,8 @@ void describe(Keys& key, Experiment& it) {
   key.section({"plant", "the simulated arm; left out: the arm as the controller models it"},
               [&] { describe_plant(key, it); });
   KEY(run, "defaults of a simulated run");
-  KEY(identification, "the steps and the findings of `softarm identify`");
+  key.section({"identification", "the steps and the findings of `softarm identify`"},
+              [&] { describe_identification(key, it.identification, it.motion_limits); });
 }
 
 }  // namespace softarm

@@ -7,6 +7,7 @@
 
 #include "softarm/base/realtime.hpp"
 #include "softarm/config/identification_settings.hpp"
+#include "softarm/config/motion_limits.hpp"
 #include "softarm/runtime/settings.hpp"
 #include "softarm/simulation/settings.hpp"
 #include "softarm/transport/settings.hpp"
@@ -31,6 +32,7 @@ struct Experiment : PipelineSettings {
   ValveDriverSettings valves;
   RunSettings run;
   IdentificationSettings identification;
+  MotionLimits motion_limits;
   std::uint64_t hash = 0;  ///< FNV-1a of the resolved configuration's text
 };
 

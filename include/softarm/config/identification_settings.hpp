@@ -1,4 +1,4 @@
-// Settings of `softarm identify`: the steps it plays, its limits, and the terms it found beyond the
+// Settings of `softarm identify`: the steps it plays, and the terms it found beyond the
 // controller's model. config/template.yaml documents every setting.
 #pragma once
 
@@ -10,8 +10,6 @@ namespace softarm {
 struct IdentificationSettings {
   std::vector<double> steps_bar = {0.2, 0.4, 0.6};
   double hold_s = 2.0;
-  double max_theta_rad = 1.5;
-  double max_speed_radps = 20.0;
 
   // Terms that the controller does not use, for predicting a recorded motion.
   std::vector<double> rest_u_rad;  ///< 2n: where the springs rest; empty: straight

@@ -100,7 +100,7 @@ class Jog {
   }
 
   void watch() {
-    const double most_rad = client_.experiment().identification.max_theta_rad;
+    const double most_rad = client_.experiment().motion_limits.max_theta_rad;
     if (sees_arm() && client_.seen().bend_rad > most_rad)
       beyond_ = fmt::format(
           "vented: a segment bends beyond identification.max_theta_rad of {:.3g} rad", most_rad);

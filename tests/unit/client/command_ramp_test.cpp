@@ -8,6 +8,8 @@
 #include <limits>
 #include <random>
 
+#include "softarm/base/time.hpp"
+
 namespace softarm {
 namespace {
 
@@ -121,7 +123,7 @@ TEST(CommandRamp, WhateverIsWantedAndWheneverTheLimitsHold) {
       ASSERT_EQ(command.shadow, 0);
       const bool expired = now_ns - before_ns >= 100 * kMs;
       expiries += expired ? 1 : 0;
-      const double passed_s = 1e-9 * static_cast<double>(now_ns - before_ns);
+      const double passed_s = to_seconds(now_ns - before_ns);
       for (std::size_t j = 0; j < 2; ++j) {
         const float bar = command.pressure_bar[j];
         ASSERT_GE(bar, 0.0F);

@@ -59,8 +59,8 @@ TEST_F(Guarded, GoesOnWhileAllIsWell) {
 TEST_F(Guarded, EndsWithTheFirstThingThatGoesWrong) {
   bool stop = false;
   const std::function<bool()> stopped = [&] { return stop; };
-  experiment.identification.max_theta_rad = 0.5;
-  experiment.identification.max_speed_radps = 0.5;
+  experiment.motion_limits.max_theta_rad = 0.5;
+  experiment.motion_limits.max_speed_radps = 0.5;
   struct Row {
     const char* says;
     std::function<void()> happens;

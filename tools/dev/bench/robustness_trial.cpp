@@ -4,6 +4,7 @@
 
 #include "dev/bench/robustness_scenes.hpp"
 #include "softarm/base/clock.hpp"
+#include "softarm/base/time.hpp"
 #include "softarm/estimation/model_observer.hpp"
 #include "softarm/model/kinematics.hpp"
 #include "softarm/runtime/control_pipeline.hpp"
@@ -68,7 +69,7 @@ RobustnessTrial run(const Experiment& asked, const RobustnessScene& scene, std::
   SimulatedArm arm(e.plant, 0);
   CommandFaults faults(scene.faults, pipeline.output().pressure_bar.size());
   const std::int64_t period_ns = pipeline.period_ns();
-  const std::int64_t validity_ns = std::llround(1e9 * e.safety.command_validity_s);
+  const std::int64_t validity_ns = to_ns(e.safety.command_validity_s);
   std::vector<MocapFrame> frames;
   std::vector<double> sent;
   PressureVector measured, wanted, before;
@@ -80,7 +81,7 @@ RobustnessTrial run(const Experiment& asked, const RobustnessScene& scene, std::
   constexpr std::int64_t kPatience_ns = 10'000'000'000;
   for (std::int64_t now_ns = 0;; now_ns += period_ns) {
     if (active_since_ns < 0 ? now_ns > kPatience_ns
-                            : 1e-9 * static_cast<double>(now_ns - active_since_ns) > until_s)
+                            : to_seconds(now_ns - active_since_ns) > until_s)
       break;
     arm.advance_to(now_ns);
     frames.clear();
@@ -109,7 +110,7 @@ RobustnessTrial run(const Experiment& asked, const RobustnessScene& scene, std::
       continue;
     }
     if (active_since_ns < 0) active_since_ns = now_ns;
-    if (1e-9 * static_cast<double>(now_ns - active_since_ns) < scene.counted_from_s) continue;
+    if (to_seconds(now_ns - active_since_ns) < scene.counted_from_s) continue;
     arm.advance_to(now_ns + period_ns / 2);
     const SegmentVector error = output.reference.u - arm.plant().u_rad();
     u_squares += error.squaredNorm() / static_cast<double>(error.size());
