@@ -40,6 +40,7 @@ class MeanPose {
 std::vector<Eigen::Isometry3d> frames_on_bodies(const ArmParameters& arm, ConstVectorRef u_rad,
                                                 std::span<const Eigen::Isometry3d> mean);
 
+/// A pose of one body and its time.
 struct TimedPose {
   std::int64_t time_ns = 0;
   Eigen::Vector3d position_m = Eigen::Vector3d::Zero();

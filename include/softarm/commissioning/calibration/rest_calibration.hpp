@@ -26,6 +26,7 @@ struct RestReading {
   bool valid = false;  ///< false: its pose fits no bend
 };
 
+/// The marker frames of an arm at rest, and how well they fit.
 struct RestCalibration {
   std::vector<PoseStatistics> body;  ///< base first; a fixed base has seen no frames
   Eigen::VectorXd rest_u_rad;        ///< 2n: the shape that the model has at rest without pressure

@@ -10,6 +10,7 @@
 
 namespace softarm {
 
+/// How often the intervals of an identification hold the truth: arms drawn at random about the configured one.
 struct CoverageStudy {
   int seeds = 100;
   double spread =
@@ -29,6 +30,7 @@ struct CoverageRow {
   double worst = 0.0;       ///< largest |error|
 };
 
+/// The outcome of a CoverageStudy, one entry a parameter.
 struct CoverageTable {
   std::vector<CoverageRow> rows;
   int seeds = 0;   ///< done

@@ -8,6 +8,7 @@
 
 namespace softarm {
 
+/// How the search for the parameters begins and refines.
 struct IdentifyOptions {
   double window_s = 0.2;       ///< of the smoothing for the start
   double longest_lag_s = 0.5;  ///< that the start considers

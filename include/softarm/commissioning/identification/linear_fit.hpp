@@ -6,6 +6,7 @@
 
 namespace softarm {
 
+/// Least squares on smoothed derivatives: the start of the refinement.
 struct LinearFit {
   Eigen::VectorXd x;               ///< in the set's scales; lag and delay as they were
   Eigen::VectorXd standard_error;  ///< of the noise alone, not of what the smoothing distorts

@@ -15,6 +15,7 @@ enum class LoggedInput {
   measured    ///< what sensors read, on straight lines between readings
 };
 
+/// A motion read from a log, and what of the log is damaged.
 struct LoggedMotion {
   MotionRecord record;
   std::string damage;  ///< what of the log was not used, for people; empty: it is whole

@@ -30,6 +30,7 @@ CrossValidation cross_validate(const ParameterSet& set, const MotionRecord& reco
                                const IdentifyOptions& options,
                                const CrossValidation* simpler = nullptr);
 
+/// One choice of terms, and how well it fits and predicts.
 struct ModelTrial {
   std::string name;
   bool damping = true;  ///< sought
@@ -37,6 +38,7 @@ struct ModelTrial {
   CrossValidation result;
 };
 
+/// What each further term of the model gains on one record.
 struct ModelComparison {
   std::vector<ModelTrial> trials;  ///< the last is the choice asked for
   double motion_rad = 0.0;         ///< of the motion about its mean

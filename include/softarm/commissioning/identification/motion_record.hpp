@@ -12,6 +12,7 @@ struct InputTrack {
   bool held = true;  ///< set points hold until the next one; measurements lie on straight lines
 };
 
+/// The motion of an arm as recorded: u over time, and the input that caused it.
 struct MotionRecord {
   Eigen::VectorXd time_s;  ///< of the frames that showed every segment, ascending
   Eigen::MatrixXd u_rad;   ///< a row for every frame, 2n columns

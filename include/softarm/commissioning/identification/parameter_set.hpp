@@ -12,6 +12,7 @@
 
 namespace softarm {
 
+/// Which chambers share one gain.
 enum class GainSharing {
   arm,      ///< one gain for all chambers
   side,     ///< chamber j of every segment alike: the paper's four sides
@@ -19,6 +20,7 @@ enum class GainSharing {
   chamber   ///< every chamber its own
 };
 
+/// Which parameters are sought; the others stay as configured.
 struct FitChoice {
   bool stiffness = true;     ///< false: as configured, where the record tells ratios only
   bool damping = true;       ///< false: as configured
@@ -46,6 +48,7 @@ struct Parameter {
   double difference = 1e-5;                                  ///< over its scale: for sensitivities
 };
 
+/// The unknowns of one identification, and how they change an arm.
 class ParameterSet {
  public:
   /// Scales are taken from `start`, which also lends every number that is not sought.

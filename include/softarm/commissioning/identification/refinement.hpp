@@ -8,6 +8,7 @@
 
 namespace softarm {
 
+/// How the nonlinear fit searches.
 struct RefinementOptions {
   int most_rounds = 40;
   /// Standard deviation, in the parameters' scales, of what was believed before; 0: nothing was.

@@ -7,6 +7,7 @@
 
 namespace softarm {
 
+/// The outcome of one check.
 enum class Verdict { pass, fail, not_checked };
 
 /// One line of the report.
