@@ -10,7 +10,8 @@
 
 namespace softarm {
 
-/// How often the intervals of an identification hold the truth: arms drawn at random about the configured one.
+/// How often the intervals of an identification hold the truth, for arms drawn at random about the
+/// configured one.
 struct CoverageStudy {
   int seeds = 100;
   double spread =
