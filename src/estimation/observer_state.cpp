@@ -49,7 +49,7 @@ ModelObserver::State::State(const ArmParameters& arm_, const EstimationSettings&
       settings(settings_.model_observer),
       predicted_frames(settings_.predicted_frames),
       max_latency_ns(to_ns(timing.max_latency_s)),
-      delay_ns(to_ns(timing.delay_s)),
+      delay_ns(to_ns(timing.dead_time_s)),
       noise(noise_.begin(), noise_.end()),
       estimator(
           [&] {
@@ -59,8 +59,8 @@ ModelObserver::State::State(const ArmParameters& arm_, const EstimationSettings&
           }(),
           arm, noise_),
       history(arm.size(),
-              8 + static_cast<int>(
-                      std::ceil((timing.max_latency_s + timing.delay_s) / timing.control_period_s)),
+              8 + static_cast<int>(std::ceil((timing.max_latency_s + timing.dead_time_s) /
+                                             timing.control_period_s)),
               timing.valve_lag_s),
       predictor(arm),
       base_average(noise_.front().orientation_rad),

@@ -22,7 +22,7 @@ std::unique_ptr<ModelObserver> make_observer(const PipelineSettings& settings) {
       ObserverTiming{.valve_lag_s = settings.control.valve_lag_s,
                      .max_latency_s = settings.safety.max_latency_s,
                      .control_period_s = 1.0 / settings.rate_hz,
-                     .delay_s = settings.control.dead_time_s});
+                     .dead_time_s = settings.control.dead_time_s});
 }
 
 }  // namespace

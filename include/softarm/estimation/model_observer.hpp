@@ -22,7 +22,7 @@ struct ObserverTiming {
   double valve_lag_s = 0.0;        ///< first order, from set point to pressure
   double max_latency_s = 0.05;     ///< no frame older than this comes
   double control_period_s = 2e-3;  ///< between commands
-  double delay_s = 0.0;            ///< dead time of valves and tubes
+  double dead_time_s = 0.0;        ///< of valves and tubes
 };
 
 /// State: u, u', a disturbance (generalized force) d, and five parameters a segment: stiffness,
