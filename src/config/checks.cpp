@@ -36,7 +36,8 @@ class Checks {
     check_rotation("plant.arm.base.rotation", experiment_.plant.arm.base_rotation);
     check_rotation("daemon.mocap.axes", experiment_.transport.mocap.axes);
     check_radius("arm", experiment_.arm, false);
-    check_radius("plant.arm", experiment_.plant.arm, experiment_.plant.kind == PlantKind::links);
+    check_radius("plant.arm", experiment_.plant.arm,
+                 experiment_.plant.kind.get_if<LinkSettings>() != nullptr);
     check_actuation("actuation", experiment_.actuation);
     check_actuation("plant.actuation", experiment_.plant.actuation);
     check_same_chambers();
@@ -141,9 +142,9 @@ class Checks {
     const auto& phases = experiment_.reference.phases;
     for (std::size_t i = 0; i < phases.size(); ++i) {
       const std::string key = fmt::format("reference[{}]", i);
-      if (const auto* hold = std::get_if<SetPointReference>(&phases[i].kind)) {
+      if (const auto* hold = phases[i].kind.get_if<SetPointReference>()) {
         check_pose(key, hold->u_rad);
-      } else if (const auto* paper = std::get_if<PaperReference>(&phases[i].kind)) {
+      } else if (const auto* paper = phases[i].kind.get_if<PaperReference>()) {
         require(paper->theta_rad <= experiment_.control.max_theta_rad, key + ".theta_rad",
                 fmt::format("at most control.max_theta_rad ({} rad)",
                             experiment_.control.max_theta_rad),
@@ -153,7 +154,7 @@ class Checks {
         require(!experiment_.actuation.plane_rad ||
                     (outside < kInPlane_rad && paper->phi_amplitude_rad == 0.0),
                 key, "a reference in the plane of actuation.plane_rad", "one that leaves it");
-      } else if (const auto* way = std::get_if<WayPointReference>(&phases[i].kind)) {
+      } else if (const auto* way = phases[i].kind.get_if<WayPointReference>()) {
         check_way_points(key + ".points", *way);
       }
     }

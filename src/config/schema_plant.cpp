@@ -1,4 +1,5 @@
 // The description of the simulated arm.
+#include <algorithm>
 #include <array>
 #include <vector>
 
@@ -107,41 +108,58 @@ void describe_world(SchemaVisitor& visitor, PlantSettings& plant) {
       });
 }
 
+void describe(SchemaVisitor& visitor, RefinedSettings& refined) {
+  visitor.integer({"pieces", "", "a segment", from_to(1, kMaxSegments)}, refined.pieces);
+  const auto weights = [&](const char* key, const char* doc, std::vector<double>& values) {
+    values.resize(static_cast<std::size_t>(refined.pieces), 1.0);
+    visitor.numbers({key, "", doc, above_to(0.0, kMany)},
+                    {Shape::Kind::scalar_or_list, refined.pieces}, values);
+  };
+  weights("length_weights", "of the pieces of a segment, base to tip; their ratios count",
+          refined.length_weights);
+  weights("mass_weights", "the same", refined.mass_weights);
+  weights("rigidity_weights", "of E I, and of damping alike; the segment's k and beta stay",
+          refined.rigidity_weights);
+}
+
+void describe(SchemaVisitor& visitor, LinkSettings& links) {
+  visitor.integer({"links_per_segment", "", "each with two crossed revolute joints at its start",
+                   from_to(1, kMaxLinksPerSegment)},
+                  links.links_per_segment);
+  static const std::array<const char*, 1> kJoints = {"crossed"};
+  visitor.choice({"joints", "", "crossed: two angles, about x and y"}, kJoints, links.joints);
+  visitor.optional_number(
+      {"joint_stiffness_nm_per_rad", "N m/rad",
+       "of every joint about each axis; left out: k times links_per_segment", from_to(0.0, 1e6)},
+      links.joint_stiffness_nm_per_rad);
+  visitor.optional_number({"joint_damping_nms_per_rad", "N m s/rad",
+                           "the same; left out: beta times links_per_segment", from_to(0.0, 1e6)},
+                          links.joint_damping_nms_per_rad);
+}
+
+/// The section of a kind, whichever is chosen.
+template <class K>
+void kind_section(SchemaVisitor& visitor, PlantKind& chosen, K settings, const char* doc) {
+  if (const K* kind = chosen.get_if<K>()) settings = *kind;
+  visitor.section({settings.name(), "", doc}, SectionKind::plain,
+                  [&] { describe(visitor, settings); });
+  if (chosen.get_if<K>() != nullptr) chosen = settings;
+}
+
 void describe_kind(SchemaVisitor& visitor, PlantSettings& plant) {
-  static const std::array<const char*, 3> kKinds = {"pcc", "refined", "links"};
+  const std::vector<PlantKind>& kinds = plant_kinds().all();
+  std::vector<const char*> names;
+  for (const PlantKind& kind : kinds) names.push_back(kind.name());
+  const std::string before = plant.kind.name();
+  int index = static_cast<int>(std::find(names.begin(), names.end(), before) - names.begin());
   visitor.choice({"kind", "",
                   "pcc: the model; refined: several constant-curvature pieces a segment; links: "
                   "rigid links, the paper's section VI"},
-                 kKinds, plant.kind);
-  visitor.section({"refined", "", "for kind refined"}, SectionKind::plain, [&] {
-    RefinedSettings& refined = plant.refined;
-    visitor.integer({"pieces", "", "a segment", from_to(1, kMaxSegments)}, refined.pieces);
-    const auto weights = [&](const char* key, const char* doc, std::vector<double>& values) {
-      values.resize(static_cast<std::size_t>(refined.pieces), 1.0);
-      visitor.numbers({key, "", doc, above_to(0.0, kMany)},
-                      {Shape::Kind::scalar_or_list, refined.pieces}, values);
-    };
-    weights("length_weights", "of the pieces of a segment, base to tip; their ratios count",
-            refined.length_weights);
-    weights("mass_weights", "the same", refined.mass_weights);
-    weights("rigidity_weights", "of E I, and of damping alike; the segment's k and beta stay",
-            refined.rigidity_weights);
-  });
-  visitor.section({"links", "", "for kind links"}, SectionKind::plain, [&] {
-    LinkSettings& links = plant.links;
-    visitor.integer({"links_per_segment", "", "each with two crossed revolute joints at its start",
-                     from_to(1, kMaxLinksPerSegment)},
-                    links.links_per_segment);
-    static const std::array<const char*, 1> kJoints = {"crossed"};
-    visitor.choice({"joints", "", "crossed: two angles, about x and y"}, kJoints, links.joints);
-    visitor.optional_number(
-        {"joint_stiffness_nm_per_rad", "N m/rad",
-         "of every joint about each axis; left out: k times links_per_segment", from_to(0.0, 1e6)},
-        links.joint_stiffness_nm_per_rad);
-    visitor.optional_number({"joint_damping_nms_per_rad", "N m s/rad",
-                             "the same; left out: beta times links_per_segment", from_to(0.0, 1e6)},
-                            links.joint_damping_nms_per_rad);
-  });
+                 names, index);
+  const PlantKind& chosen = kinds[static_cast<std::size_t>(index)];
+  if (before != chosen.name()) plant.kind = chosen;
+  kind_section(visitor, plant.kind, RefinedSettings{}, "for kind refined");
+  kind_section(visitor, plant.kind, LinkSettings{}, "for kind links");
 }
 
 }  // namespace

@@ -50,9 +50,6 @@ void describe_way_points(SchemaVisitor& visitor, WayPointReference& reference, i
       });
 }
 
-constexpr int kFirstTipPath =
-    4;  ///< of the names of kinds: what follows are shapes of a tip's path
-
 void describe_tip_path(SchemaVisitor& visitor, TipPathReference& path) {
   const auto vector = [&](const char* key, const char* doc, Eigen::Vector3d& value) {
     std::vector<double> values(value.data(), value.data() + 3);
@@ -66,26 +63,22 @@ void describe_tip_path(SchemaVisitor& visitor, TipPathReference& path) {
   visitor.number({"rate_radps", "rad/s", "of the path", from_to(0.0, 1e3)}, path.rate_radps);
 }
 
-void set_kind(ReferenceKind& kind, int index) {
-  if (index >= kFirstTipPath) {
-    if (!std::holds_alternative<TipPathReference>(kind)) kind = TipPathReference{};
-    std::get<TipPathReference>(kind).shape = static_cast<TipPathShape>(index - kFirstTipPath);
-    return;
-  }
-  if (static_cast<int>(kind.index()) == index) return;
-  if (index == 0) kind = SetPointReference{};
-  if (index == 1) kind = PaperReference{};
-  if (index == 2) kind = WayPointReference{};
-  if (index == 3) kind = LiveReference{};
+/// Declares the keys of a kind, if the phase is of that kind.
+template <class K, class Describe>
+void keys_of(ReferencePhase& phase, const Describe& describe_kind) {
+  const K* kind = phase.kind.get_if<K>();
+  if (kind == nullptr) return;
+  K settings = *kind;
+  describe_kind(settings);
+  phase.kind = settings;
 }
 
 void describe_phase(SchemaVisitor& visitor, ReferencePhase& phase, bool last, int segments) {
-  static const std::array<const char*, 7> kKinds = {
-      "set_point", "paper", "way_points", "live", "tip_point", "tip_circle", "tip_lemniscate"};
-  int index = static_cast<int>(phase.kind.index());
-  if (const auto* path = std::get_if<TipPathReference>(&phase.kind)) {
-    index = kFirstTipPath + static_cast<int>(path->shape);
-  }
+  const std::vector<ReferenceKind>& kinds = reference_kinds().all();
+  std::vector<const char*> names;
+  for (const ReferenceKind& kind : kinds) names.push_back(kind.name());
+  const std::string before = phase.kind.name();
+  int index = static_cast<int>(std::find(names.begin(), names.end(), before) - names.begin());
   visitor.choice(
       {"kind",
        "",
@@ -93,26 +86,27 @@ void describe_phase(SchemaVisitor& visitor, ReferencePhase& phase, bool last, in
        "the tip by (21), tip_lemniscate: (22)",
        {},
        kRequired},
-      kKinds, index);
-  set_kind(phase.kind, index);
+      names, index);
+  const ReferenceKind& chosen = kinds[static_cast<std::size_t>(index)];
+  if (before != chosen.name()) phase.kind = chosen;
   if (!last) {
     visitor.number({"duration_s", "s", "of the phase; the last one lasts for ever and has none",
                     above_to(0.0, kMany), kRequired},
                    phase.duration_s);
   }
-  if (auto* hold = std::get_if<SetPointReference>(&phase.kind)) {
-    describe_pose(visitor, hold->u_rad, segments, kRequired);
-  } else if (auto* paper = std::get_if<PaperReference>(&phase.kind)) {
-    describe_paper(visitor, *paper);
-  } else if (auto* way = std::get_if<WayPointReference>(&phase.kind)) {
-    describe_way_points(visitor, *way, segments);
-  } else if (auto* live = std::get_if<LiveReference>(&phase.kind)) {
+  keys_of<SetPointReference>(phase, [&](SetPointReference& hold) {
+    describe_pose(visitor, hold.u_rad, segments, kRequired);
+  });
+  keys_of<PaperReference>(phase, [&](PaperReference& paper) { describe_paper(visitor, paper); });
+  keys_of<WayPointReference>(
+      phase, [&](WayPointReference& way) { describe_way_points(visitor, way, segments); });
+  keys_of<LiveReference>(phase, [&](LiveReference& live) {
     visitor.number(
         {"timeout_s", "s", "silence after which the last u is held at rest", above_to(0.0, 1e3)},
-        live->timeout_s);
-  } else if (auto* path = std::get_if<TipPathReference>(&phase.kind)) {
-    describe_tip_path(visitor, *path);
-  }
+        live.timeout_s);
+  });
+  keys_of<TipPathReference>(phase,
+                            [&](TipPathReference& path) { describe_tip_path(visitor, path); });
 }
 
 void describe_safety(SchemaVisitor& visitor, SafetySettings& safety) {

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "simulation/integrator.hpp"
-#include "simulation/plant_system.hpp"
+#include "softarm/simulation/plant_system.hpp"
 
 namespace softarm {
 namespace {
@@ -113,7 +113,7 @@ struct ArmPlant::Implementation {
         valves(settings.valves, count_chambers(settings.actuation),
                settings.actuation.kind == ActuationKind::torque),
         map(chamber_map(settings.actuation)),
-        system(make_plant_system(settings)),
+        system(settings.kind.make(settings)),
         integrator(make_integrator(*system, integrator_settings(settings))),
         present_nm(Eigen::VectorXd::Zero(arm.dof())),
         target_nm(Eigen::VectorXd::Zero(arm.dof())),

@@ -36,7 +36,7 @@ Linear linear(const Experiment& experiment, bool per_segment) {
 
 TEST(Identify, LeastSquaresFindThePccPlantsOwnParameters) {
   Experiment experiment = load_experiment(kConfig / "paper_simulation.yaml");
-  experiment.plant.kind = PlantKind::pcc;
+  experiment.plant.kind = PccSettings{};
   for (SegmentParameters& segment : experiment.plant.arm.segments) {
     segment.stiffness_nm_per_rad = 2.7;  // not what the controller believes
     segment.damping_nms_per_rad = 0.35;
@@ -50,7 +50,7 @@ TEST(Identify, LeastSquaresFindThePccPlantsOwnParameters) {
 
 TEST(Identify, LeastSquaresTellSegmentsApart) {
   Experiment experiment = load_experiment(kConfig / "paper_simulation.yaml");
-  experiment.plant.kind = PlantKind::pcc;
+  experiment.plant.kind = PccSettings{};
   const double stiffness[] = {1.5, 2.0, 2.5, 3.0};
   for (std::size_t i = 0; i < 4; ++i)
     experiment.plant.arm.segments[i].stiffness_nm_per_rad = stiffness[i];
