@@ -91,8 +91,7 @@ void ArmListener::look_at_clock() {
 /// Bodies that nobody configured.
 void ArmListener::note_ids(std::span<const std::byte> bytes) {
   softarm_messages::mocap_frame_t message;
-  if (experiment_.transport.mocap.source != MocapSourceKind::softarm || !decode(bytes, message))
-    return;
+  if (experiment_.transport.mocap.source != softarm_mocap() || !decode(bytes, message)) return;
   for (const auto& body : message.bodies)
     if (known_ids_.insert(body.id).second) seen_.other_ids.push_back(body.id);
 }

@@ -194,7 +194,7 @@ class Checks {
   /// Where every body has a channel of its own.
   void check_body_channels(std::set<std::string>& seen) const {
     const TransportSettings& transport = experiment_.transport;
-    if (transport.mocap.source != MocapSourceKind::rigid_transform) return;
+    if (!transport.mocap.source.channel_per_body) return;
     const auto check = [&](const std::string& key, const PlateSettings& plate) {
       check_word(key, plate.name);
       const std::string channel = body_channel(transport.lcm, plate);

@@ -203,7 +203,6 @@ void describe_realtime(SchemaVisitor& visitor, RealtimeSettings& realtime) {
 }
 
 void describe_mocap(SchemaVisitor& visitor, TransportSettings& transport) {
-  static const std::array<const char*, 3> kSources = {"softarm", "optitrack", "rigid_transform"};
   static const std::array<const char*, 2> kUnits = {"m", "mm"};
   static const std::array<const char*, 2> kOrders = {"xyzw", "wxyz"};
   static const std::array<const char*, 2> kAxes = {"z_up", "y_up"};
@@ -211,16 +210,19 @@ void describe_mocap(SchemaVisitor& visitor, TransportSettings& transport) {
       Eigen::Matrix3d::Identity(),
       (Eigen::Matrix3d() << 1.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 1.0, 0.0).finished()};
   MocapSourceSettings& mocap = transport.mocap;
+  const std::vector<MocapSourceKind>& sources = mocap_sources().all();
+  std::vector<const char*> names;
+  for (const MocapSourceKind& source : sources) names.push_back(source.name());
+  int index =
+      static_cast<int>(std::find(sources.begin(), sources.end(), mocap.source) - sources.begin());
   visitor.choice({"source", "",
                   "softarm: mocap_frame_t; optitrack: optitrack_frame_t; rigid_transform: "
                   "rigid_transform_t (Vicon), one channel a body"},
-                 kSources, mocap.source);
+                 names, index);
   if (visitor.reading()) {
-    const auto kind = mocap.source;
-    const bool optitrack = kind == MocapSourceKind::optitrack;
-    mocap.quaternion = optitrack ? QuaternionOrder::xyzw : QuaternionOrder::wxyz;
-    if (optitrack) transport.lcm.mocap_channel = "OPTITRACK_FRAMES";
-    if (kind == MocapSourceKind::rigid_transform) transport.lcm.mocap_channel = "VICON";
+    mocap.source = sources[static_cast<std::size_t>(index)];
+    mocap.quaternion = mocap.source.quaternion;
+    transport.lcm.mocap_channel = mocap.source.channel;
   }
   visitor.choice({"unit", "", "of the positions sent"}, kUnits, mocap.unit);
   visitor.choice({"quaternion", "", "order sent; left out: xyzw for optitrack, wxyz otherwise"},
@@ -336,7 +338,7 @@ void describe_daemon(SchemaVisitor& visitor, Experiment& experiment, int segment
                   [&] { describe_safety(visitor, experiment.safety); });
   visitor.section({"mocap", "", "who sends motion-capture frames, and what the numbers mean"},
                   SectionKind::plain, [&] { describe_mocap(visitor, transport); });
-  const bool named = transport.mocap.source == MocapSourceKind::rigid_transform;
+  const bool named = transport.mocap.source.channel_per_body;
   visitor.section({"bodies", "", "which bodies of a frame carry the base and the segments' ends"},
                   SectionKind::plain,
                   [&] { describe_bodies(visitor, transport.bodies, segments, named); });

@@ -1,5 +1,6 @@
 #include "softarm/transport/mocap_adapter.hpp"
 
+#include <algorithm>
 #include <span>
 
 #include "softarm/transport/settings.hpp"
@@ -38,15 +39,13 @@ MocapAdapter::MocapAdapter(const BodySettings& bodies, const ArmParameters& arm,
     set(plate_[i + 1], bodies.segment_plates[i]);
 }
 
-template <class Number>
-BodyPose MocapAdapter::seen(const Number* position, const Number* orientation,
-                            std::size_t body) const noexcept {
+BodyPose MocapAdapter::to_pose(const SentBody& sent, std::size_t body) const noexcept {
   BodyPose pose;
-  pose.valid = true;
-  for (int axis = 0; axis < 3; ++axis) pose.position_m[axis] = double{position[axis]};
-  const Number* vector = xyzw_ ? orientation : orientation + 1;
-  const Number scalar = xyzw_ ? orientation[3] : orientation[0];
-  pose.orientation = Eigen::Quaterniond(scalar, vector[0], vector[1], vector[2]);
+  pose.valid = sent.seen;
+  pose.position_m = Eigen::Vector3d::Map(sent.position.data());
+  const double* vector = sent.orientation.data() + (xyzw_ ? 0 : 1);
+  pose.orientation =
+      Eigen::Quaterniond(sent.orientation[xyzw_ ? 3 : 0], vector[0], vector[1], vector[2]);
   if (unit_m_ != 1.0) pose.position_m *= unit_m_;
   if (turned_) {
     pose.position_m = (axes_matrix_ * pose.position_m).eval();
@@ -60,29 +59,24 @@ BodyPose MocapAdapter::seen(const Number* position, const Number* orientation,
   return pose;
 }
 
-MocapAdapter::Sent MocapAdapter::sent(const BodyPose& pose, std::size_t body) const noexcept {
-  Sent out{pose.position_m, pose.orientation};
+SentBody MocapAdapter::to_sent(const BodyPose& pose, std::size_t body) const noexcept {
+  Eigen::Vector3d position = pose.position_m;
+  Eigen::Quaterniond orientation = pose.orientation;
   const Plate& plate = plate_[body];
   if (plate.given) {
-    out.orientation = out.orientation * plate.orientation.conjugate();
-    out.position -= out.orientation * plate.position_m;
+    orientation = orientation * plate.orientation.conjugate();
+    position -= orientation * plate.position_m;
   }
   if (turned_) {
-    out.position = (axes_matrix_.transpose() * out.position).eval();
-    out.orientation = axes_.conjugate() * out.orientation;
+    position = (axes_matrix_.transpose() * position).eval();
+    orientation = axes_.conjugate() * orientation;
   }
-  if (unit_m_ != 1.0) out.position /= unit_m_;
-  return out;
-}
-
-template <class Number>
-void MocapAdapter::write(const Sent& sent, Number* position, Number* orientation) const noexcept {
-  for (int axis = 0; axis < 3; ++axis) position[axis] = static_cast<Number>(sent.position[axis]);
-  Number* vector = xyzw_ ? orientation : orientation + 1;
-  orientation[xyzw_ ? 3 : 0] = static_cast<Number>(sent.orientation.w());
-  vector[0] = static_cast<Number>(sent.orientation.x());
-  vector[1] = static_cast<Number>(sent.orientation.y());
-  vector[2] = static_cast<Number>(sent.orientation.z());
+  if (unit_m_ != 1.0) position /= unit_m_;
+  SentBody sent{.id = id(body), .seen = pose.valid};
+  Eigen::Vector3d::Map(sent.position.data()) = position;
+  Eigen::Vector3d::Map(sent.orientation.data() + (xyzw_ ? 0 : 1)) = orientation.vec();
+  sent.orientation[xyzw_ ? 3 : 0] = orientation.w();
+  return sent;
 }
 
 void MocapAdapter::clear(MocapFrame& frame) const noexcept {
@@ -91,77 +85,24 @@ void MocapAdapter::clear(MocapFrame& frame) const noexcept {
   if (base_is_fixed()) frame.body[0] = fixed_base_;
 }
 
-template <class Bodies, class Read>
-void MocapAdapter::pick(const Bodies& bodies, const Read& read, MocapFrame& frame) const noexcept {
+void MocapAdapter::to_frame(const SentFrame& sent, MocapFrame& frame) const noexcept {
   clear(frame);
+  frame.frame_number = sent.frame_number;
+  const auto bodies = std::span(sent.body).first(std::min(sent.bodies, sent.body.size()));
   for (std::size_t i = base_is_fixed() ? 1 : 0; i < plate_.size(); ++i) {
-    for (const auto& body : bodies) {
-      if (body.id != id(i)) continue;
-      frame.body[i] = read(body, i);
-      break;
-    }
+    const auto found = std::find_if(bodies.begin(), bodies.end(),
+                                    [&](const SentBody& body) { return body.id == id(i); });
+    if (found != bodies.end()) frame.body[i] = to_pose(*found, i);
   }
 }
 
-void MocapAdapter::to_frame(const softarm_messages::mocap_frame_t& message,
-                            MocapFrame& frame) const noexcept {
-  frame.frame_number = message.frame_number;
-  const auto read = [this](const softarm_messages::mocap_body_t& body, std::size_t i) {
-    BodyPose pose = seen(body.position_m, body.orientation, i);
-    pose.valid = body.valid != 0;
-    return pose;
-  };
-  pick(message.bodies, read, frame);
-}
-
-void MocapAdapter::to_frame(const OptitrackFrame& message, MocapFrame& frame) const noexcept {
-  frame.frame_number = message.frame_number;
-  const auto read = [this](const OptitrackBody& body, std::size_t i) {
-    BodyPose pose = seen(body.position.data(), body.orientation.data(), i);
-    pose.valid = body.tracked;
-    return pose;
-  };
-  pick(std::span(message.body).first(message.bodies), read, frame);
-}
-
-BodyPose MocapAdapter::to_pose(const softarm_messages::rigid_transform_t& message,
-                               std::size_t body) const noexcept {
-  return seen(message.trans, message.quat, body);
-}
-
-void MocapAdapter::to_message(const MocapFrame& frame, std::int64_t sender_time_us,
-                              softarm_messages::mocap_frame_t& message) const {
-  message.frame_number = frame.frame_number;
-  message.capture_time_us = sender_time_us;
-  message.bodies.clear();
-  for (std::size_t i = base_is_fixed() ? 1 : 0; i < plate_.size(); ++i) {
-    auto& body = message.bodies.emplace_back();
-    body.id = id(i);
-    body.valid = frame.body[i].valid ? 1 : 0;
-    write(sent(frame.body[i], i), body.position_m, body.orientation);
-  }
-  message.num_bodies = static_cast<std::int16_t>(message.bodies.size());
-}
-
-void MocapAdapter::to_message(const MocapFrame& frame, std::int64_t sender_time_us,
-                              softarm_messages::optitrack_frame_t& message) const {
-  message = {};
-  message.utime = sender_time_us;
-  message.frame = static_cast<std::int32_t>(frame.frame_number);
-  message.timestamp = 1e-6 * static_cast<double>(sender_time_us);
-  for (std::size_t i = base_is_fixed() ? 1 : 0; i < plate_.size(); ++i) {
-    auto& body = message.rigid_bodies.emplace_back();
-    body.id = id(i);
-    body.params = frame.body[i].valid ? 1 : 0;
-    write(sent(frame.body[i], i), body.xyz, body.quat);
-  }
-  message.num_rigid_bodies = static_cast<std::int32_t>(message.rigid_bodies.size());
-}
-
-void MocapAdapter::to_message(const BodyPose& pose, std::size_t body, std::int64_t sender_time_us,
-                              softarm_messages::rigid_transform_t& message) const noexcept {
-  message.utime = sender_time_us;
-  write(sent(pose, body), message.trans, message.quat);
+void MocapAdapter::to_sent(const MocapFrame& frame, std::int64_t sender_time_us,
+                           SentFrame& sent) const noexcept {
+  sent.frame_number = frame.frame_number;
+  sent.sender_time_us = sender_time_us;
+  sent.bodies = 0;
+  for (std::size_t i = base_is_fixed() ? 1 : 0; i < plate_.size(); ++i)
+    sent.body[sent.bodies++] = to_sent(frame.body[i], i);
 }
 
 }  // namespace softarm

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "softarm/estimation/clock_relation.hpp"
+#include "softarm/transport/mocap_format.hpp"
 
 namespace softarm {
 
@@ -26,20 +27,12 @@ struct LcmSettings {
   std::string deadman_channel;                  ///< of a dead-man input; empty: there is none
 };
 
-/// Who sends frames, and in which messages.
-enum class MocapSourceKind {
-  softarm,         ///< mocap_frame_t
-  optitrack,       ///< optitrack_frame_t
-  rigid_transform  ///< rigid_transform_t, one channel a body: lcm.mocap_channel, _, its name
-};
-/// In which order the four numbers of a quaternion are sent.
-enum class QuaternionOrder { xyzw, wxyz };
 /// Of positions as they are sent.
 enum class LengthUnit { metre, millimetre };
 
 /// What a frame's numbers mean.
 struct MocapSourceSettings {
-  MocapSourceKind source = MocapSourceKind::softarm;
+  MocapSourceKind source = softarm_mocap();
   LengthUnit unit = LengthUnit::metre;
   QuaternionOrder quaternion = QuaternionOrder::wxyz;
   /// p_world = axes * p_sent: from the sender's world to ours, whose z axis points up.

@@ -291,7 +291,7 @@ std::string calibration_text(const Experiment& experiment, const RestCalibration
 
 std::string calibrated_yaml(const Experiment& experiment, const RestCalibration& found,
                             const std::string& note, const std::string& config) {
-  const bool named = experiment.transport.mocap.source == MocapSourceKind::rigid_transform;
+  const bool named = experiment.transport.mocap.source.channel_per_body;
   const auto plate = [&](const PlateSettings& each) {
     const Eigen::Vector3d &p = each.position_m, &r = each.rotation_rad;
     return fmt::format(

@@ -35,7 +35,7 @@ class MocapKeys : public ::testing::Test {
 
 TEST_F(MocapKeys, LeftOutMeanOurOwnFrames) {
   const TransportSettings transport = load("").transport;
-  EXPECT_EQ(transport.mocap.source, MocapSourceKind::softarm);
+  EXPECT_EQ(transport.mocap.source, softarm_mocap());
   EXPECT_EQ(transport.mocap.unit, LengthUnit::metre);
   EXPECT_EQ(transport.mocap.quaternion, QuaternionOrder::wxyz);
   EXPECT_EQ(transport.mocap.axes, Eigen::Matrix3d::Identity());

@@ -1,8 +1,12 @@
-#include "softarm/transport/optitrack_frame.hpp"
-
+// OptiTrack's frame as it comes over LCM -> the little of it that is used. The type has eight
+// lists, lists within lists and texts, all of which LCM's own decoder would allocate as the bytes
+// say.
 #include <bit>
+#include <cmath>
 #include <softarm_messages/optitrack_frame_t.hpp>
 #include <type_traits>
+
+#include "transport/lcm_mocap_format.hpp"
 
 namespace softarm {
 namespace {
@@ -69,14 +73,14 @@ constexpr std::size_t kLeastSkeleton = 4 + 4;
 constexpr std::size_t kMarker = 4 + kPoint + 4 + 2;
 constexpr std::size_t kForceplate = 4 + 2 * kPoint;
 
-OptitrackBody take_body(Cursor& cursor) {
-  OptitrackBody body;
+SentBody take_body(Cursor& cursor) {
+  SentBody body;
   body.id = cursor.take<std::int32_t>();
-  for (float& each : body.position) each = cursor.take<float>();
-  for (float& each : body.orientation) each = cursor.take<float>();
+  for (double& each : body.position) each = static_cast<double>(cursor.take<float>());
+  for (double& each : body.orientation) each = static_cast<double>(cursor.take<float>());
   cursor.skip_list(kMarkerOfBody);  // three lists of one length
   cursor.skip(4);                   // mean_error
-  body.tracked = (cursor.take<std::uint16_t>() & 1U) != 0;
+  body.seen = (cursor.take<std::uint16_t>() & 1U) != 0;
   return body;
 }
 
@@ -97,25 +101,59 @@ void skip_skeletons(Cursor& cursor) {
   }
 }
 
+constexpr double kLatestStamp_us = 4e15;  // beyond what a clock relation takes, it is nonsense
+
+std::int64_t to_us(double time_s) noexcept {
+  const double time_us = 1e6 * time_s;
+  return std::llround(std::abs(time_us) <= kLatestStamp_us ? time_us : kLatestStamp_us + 1.0);
+}
+
+class OptitrackFormat final : public LcmMocapFormat<softarm_messages::optitrack_frame_t> {
+ public:
+  bool decode(std::span<const std::byte> bytes, SentFrame& frame) noexcept override {
+    Cursor cursor(bytes);
+    if (cursor.take<std::int64_t>() != softarm_messages::optitrack_frame_t::getHash()) return false;
+    cursor.skip(8);  // utime, the sender's wall clock
+    frame.frame_number = cursor.take<std::int32_t>();
+    skip_marker_sets(cursor);
+    cursor.skip_list(kPoint);  // markers of no body
+    frame.bodies = cursor.count(kLeastRigidBody);
+    if (frame.bodies > SentFrame::kMostBodies) return false;
+    for (std::size_t i = 0; i < frame.bodies && cursor.ok(); ++i) frame.body[i] = take_body(cursor);
+    skip_skeletons(cursor);
+    cursor.skip_list(kMarker);
+    cursor.skip_list(kForceplate);
+    cursor.skip(4 + 8 + 8);                               // latency and timecode
+    frame.sender_time_us = to_us(cursor.take<double>());  // the cameras' own clock
+    cursor.skip(2);                                       // params
+    return cursor.at_end();
+  }
+
+  std::span<const std::byte> encode(const SentFrame& frame) override {
+    message_ = {};
+    message_.utime = frame.sender_time_us;
+    message_.frame = static_cast<std::int32_t>(frame.frame_number);
+    message_.timestamp = 1e-6 * static_cast<double>(frame.sender_time_us);
+    message_.num_rigid_bodies = static_cast<std::int32_t>(frame.bodies);
+    for (const SentBody& from : std::span(frame.body).first(frame.bodies)) {
+      auto& body = message_.rigid_bodies.emplace_back();
+      body.id = from.id;
+      body.params = from.seen ? 1 : 0;
+      for (std::size_t k = 0; k < 3; ++k) body.xyz[k] = static_cast<float>(from.position[k]);
+      for (std::size_t k = 0; k < 4; ++k) body.quat[k] = static_cast<float>(from.orientation[k]);
+    }
+    return encoded();
+  }
+};
+
 }  // namespace
 
-bool decode(std::span<const std::byte> bytes, OptitrackFrame& frame) noexcept {
-  Cursor cursor(bytes);
-  if (cursor.take<std::int64_t>() != softarm_messages::optitrack_frame_t::getHash()) return false;
-  frame.utime_us = cursor.take<std::int64_t>();
-  frame.frame_number = cursor.take<std::int32_t>();
-  skip_marker_sets(cursor);
-  cursor.skip_list(kPoint);  // markers of no body
-  frame.bodies = cursor.count(kLeastRigidBody);
-  if (frame.bodies > OptitrackFrame::kMostBodies) return false;
-  for (std::size_t i = 0; i < frame.bodies && cursor.ok(); ++i) frame.body[i] = take_body(cursor);
-  skip_skeletons(cursor);
-  cursor.skip_list(kMarker);
-  cursor.skip_list(kForceplate);
-  cursor.skip(4 + 8 + 8);  // latency and timecode
-  frame.timestamp_s = cursor.take<double>();
-  cursor.skip(2);  // params
-  return cursor.at_end();
+MocapSourceKind optitrack_mocap() {
+  return {
+      .label = "optitrack",
+      .make = []() -> std::unique_ptr<MocapFormat> { return std::make_unique<OptitrackFormat>(); },
+      .channel = "OPTITRACK_FRAMES",
+      .quaternion = QuaternionOrder::xyzw};
 }
 
 }  // namespace softarm
