@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Draws data_flow.svg and conventions.svg beside itself; with --check only tells whether they are up to date."""
+"""Draws data_flow.svg and conventions.svg in docs/explanation; --check only reports whether they are up to date."""
 import math
 import pathlib
 import sys
@@ -21,7 +21,7 @@ COLOURS = {"ink": INK, "soft": LINE, "blue": BLUE, "red": RED, "green": GREEN}
 
 
 class Drawing:
-    """A light card, so that the drawing reads the same on white and on dark pages."""
+    """On a light background, so that the drawing reads the same on white and on dark pages."""
 
     def __init__(self, width, height, title):
         self.parts = [f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" role="img">\n',
@@ -71,19 +71,19 @@ def data_flow():
     d.text(450, 49, "one tick, 50 Hz to 1 kHz and above", "small")
     stages = [("validate", "order, age, jumps,", "quaternions, lengths", "estimation/"),
               ("estimate", "u by (19), (20)", "filter: u, u′ now", "estimation/"),
-              ("safety", "active, hold, vent,", "fault: and why", "daemon/"),
+              ("safety", "active, hold, vent,", "fault, with reason", "runtime/"),
               ("control (17)", "feed-forward of the", "reference, K_P, K_D", "control/, model/"),
               ("allocate", "τ_A to pressures", "of all chambers", "actuation/"),
               ("limit", "0 to p_max, slew,", "ramp when venting", "actuation/")]
     width, gap, top = 130, 16, 92
-    for i, (name, first, second, room) in enumerate(stages):
+    for i, (name, first, second, module) in enumerate(stages):
         x = 366 + i * (width + gap)
         d.box(x, top, width, 78)
         middle = x + width / 2
         d.text(middle, top + 25, name, "head mid")
         d.text(middle, top + 47, first, "small mid")
         d.text(middle, top + 63, second, "small mid")
-        d.text(middle, top - 8, room, "small mid")
+        d.text(middle, top - 8, module, "small mid")
         if i:
             d.path([(x - gap + 1, top + 39), (x - 1, top + 39)])
     control = 366 + 3 * (width + gap) + width / 2
@@ -203,7 +203,7 @@ def one_segment(d):
     d.path(wedge, "ink", 1.4)
     d.text(centre[0] - r * math.cos(theta / 2) - 20, centre[1] + r * math.sin(theta / 2) + 6, "θ", "symbol")
     d.text((x + centre[0]) / 2 + 20, y - 8, "L / θ", "symbol")
-    # theta again: between z of the lower frame, carried on, and z of the upper frame.
+    # theta again: between the extended z of the lower frame and z of the upper frame.
     d.path([end[:2], (end[0], end[1] + 60)], "soft", 1, arrow=False, dash="4 3")
     turn = [(end[0] + 40 * math.sin(theta * k / 20), end[1] + 40 * math.cos(theta * k / 20)) for k in range(21)]
     d.path(turn, "ink", 1.4)
@@ -257,13 +257,13 @@ def conventions():
 
 
 def main():
-    folder = pathlib.Path(__file__).resolve().parent
+    folder = pathlib.Path(__file__).resolve().parent / "explanation"
     stale = []
     for name, draw in (("data_flow.svg", data_flow), ("conventions.svg", conventions)):
         path = folder / name
         if "--check" in sys.argv[1:]:
             if not path.exists() or path.read_text(encoding="utf-8") != draw():
-                stale.append(f"docs/{name} is not what docs/drawings.py draws")
+                stale.append(f"docs/explanation/{name} is not what docs/drawings.py draws: run it without --check")
         else:
             path.write_text(draw(), encoding="utf-8")
     print("\n".join(stale) or "drawings are up to date")

@@ -1,7 +1,6 @@
 #!/usr/bin/python3
-"""Plots of an identification: reads DIR/identification.csv of `softarm identify --out DIR`, writes DIR/identification.png:
-measured and simulated u of every segment, what is left over, and how that is correlated in time."""
-import argparse
+"""Plots an identification: reads DIR/identification.csv of `softarm identify --out DIR`, writes DIR/identification.png with
+measured and simulated u of every segment, the residual, and its correlation in time."""
 import csv
 import pathlib
 import sys
@@ -10,6 +9,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.lines import Line2D
 from plotting import style
+from plotting.command_line import Parser
 
 
 def read(path):
@@ -39,9 +39,9 @@ def draw(directory):
     for i in range(segments):
         for axis in range(2):
             k, colour = 2 * i + axis, style.COMPONENT[axis]
-            time, seen, told, left = style.thinned(t_s, measured[:, k], simulated[:, k], residual[:, k])
+            time, seen, predicted, left = style.thinned(t_s, measured[:, k], simulated[:, k], residual[:, k])
             grid[i, 0].plot(time, seen, color=style.ESTIMATE, linewidth=2.4)
-            grid[i, 0].plot(time, told, color=colour)
+            grid[i, 0].plot(time, predicted, color=colour)
             grid[i, 1].plot(time, 1e3 * left, color=colour, linewidth=0.8)
             grid[i, 2].plot(1e3 * period_s * np.arange(lags), autocorrelation(residual[:, k], lags), color=colour)
         grid[i, 0].set_ylabel(f"u of segment {i + 1} [rad]")
@@ -60,8 +60,8 @@ def draw(directory):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("directory", metavar="DIR", type=pathlib.Path, help="where identification.csv is")
+    parser = Parser(description=__doc__)
+    parser.add_argument("directory", metavar="DIR", type=pathlib.Path, help="folder of identification.csv")
     arguments = parser.parse_args()
     try:
         print(draw(arguments.directory))

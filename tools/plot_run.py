@@ -1,17 +1,17 @@
 #!/usr/bin/python3
-"""Plots of a run, and a report that holds them: reads DIR/log.csv, summary.json and timing.json, writes PNGs and report.html."""
-import argparse
+"""Plots a run and writes a report: reads DIR/log.csv, summary.json and timing.json, writes PNGs and report.html."""
 import pathlib
 import re
 import sys
 
 from plotting import figures, report
+from plotting.command_line import Parser
 from plotting.run_log import RunLog
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("directory", metavar="DIR", type=pathlib.Path, help="where the run's log.csv is")
+    parser = Parser(description=__doc__)
+    parser.add_argument("directory", metavar="DIR", type=pathlib.Path, help="folder of log.csv")
     parser.add_argument("--title", help="title of the report (default: the experiment's name)")
     parser.add_argument("--tracking-from", metavar="S", type=float, default=1.0,
                         help="errors count from S seconds after control became ACTIVE (default: %(default)s)")

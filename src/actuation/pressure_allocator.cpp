@@ -6,6 +6,8 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "softarm/actuation/input_map.hpp"
+
 namespace softarm {
 namespace {
 
@@ -111,9 +113,9 @@ PressureAllocator::PressureAllocator(const ActuationSettings& settings)
     check_chambers(i, chambers, planar_);
     std::vector<std::array<double, 2>> spatial;
     std::vector<std::array<double, 1>> planar;
-    for (const Chamber& c : chambers) {
-      const std::array<double, 2> column{c.gain_nm_per_bar * std::sin(c.angle_rad),
-                                         -c.gain_nm_per_bar * std::cos(c.angle_rad)};
+    const Eigen::Matrix2Xd map = input_map(settings.kind, chambers);
+    for (const auto& force : map.colwise()) {
+      const std::array<double, 2> column{-force.y(), force.x()};  // A_chamber^-1
       spatial.push_back(column);
       planar.push_back({plane_[0] * column[0] + plane_[1] * column[1]});
     }

@@ -81,8 +81,8 @@ void ServiceNotifier::open(std::string_view address) {
 void ServiceNotifier::report(std::int64_t now_ns, const ServiceReport& report) noexcept {
   if (socket_ < 0) return;
   const bool changed = report.state != state_ || report.reason != reason_;
-  const bool alive = alive_every_ns_ > 0 && report.on_time &&
-                     (alive_ns_ == 0 || now_ns - alive_ns_ >= alive_every_ns_);
+  const bool alive =
+      alive_every_ns_ > 0 && report.on_time && age_ns(now_ns, alive_ns_) >= alive_every_ns_;
   Message message;
   if (!ready_) message.add("READY=1\n");
   if (report.stopping && !stopping_) message.add("STOPPING=1\n");

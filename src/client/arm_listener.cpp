@@ -6,6 +6,7 @@
 #include <chrono>
 
 #include "softarm/base/clock.hpp"
+#include "softarm/base/time.hpp"
 #include "softarm/runtime/safety_monitor.hpp"
 #include "softarm/transport/message_decoding.hpp"
 #include "softarm/transport/settings.hpp"
@@ -16,12 +17,6 @@ namespace {
 constexpr int kQueue = 1024;
 constexpr std::int64_t kSpeedSpan_ns = 50'000'000;  ///< so far apart, noise is no speed
 constexpr std::int64_t kStatusCounts_ns = 1'000'000'000;
-
-std::int64_t wall_now_ns() {
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(
-             std::chrono::system_clock::now().time_since_epoch())
-      .count();
-}
 
 TransportSettings with_other_order(TransportSettings transport) {
   transport.mocap.quaternion = transport.mocap.quaternion == QuaternionOrder::wxyz
@@ -65,14 +60,9 @@ ArmListener::ArmListener(const Experiment& experiment, LcmNode& node, bool keep)
   });
 }
 
-// Not the time at which we look: what else we do must not count as jitter.
-std::int64_t ArmListener::arrival_ns(const ReceivedMessage& packet) const {
-  return std::min(monotonic_now_ns(), 1000 * packet.arrival_utime_us - seen_.wall_minus_ns);
-}
-
 // Called from LCM: nothing may be thrown through it. Storage grows, which is all it can fail at.
 void ArmListener::take_packet(std::size_t channel, const ReceivedMessage& packet) {
-  const std::int64_t now_ns = arrival_ns(packet);
+  const std::int64_t now_ns = packet.arrival_ns;  // what else we do must not count as jitter
   if (keep_) {
     note_ids(packet.bytes);
     in_other_order_.take(channel, packet.bytes, now_ns, other_frame_);
@@ -122,7 +112,7 @@ void ArmListener::take_pressures(const ReceivedMessage& packet) {
   if (!decode(packet.bytes, measurement_message_)) return;
   measured_bar_.assign(measurement_message_.pressure_bar.begin(),
                        measurement_message_.pressure_bar.end());
-  if (keep_) seen_.pressures.push_back({arrival_ns(packet), measured_bar_});
+  if (keep_) seen_.pressures.push_back({packet.arrival_ns, measured_bar_});
 }
 
 double ArmListener::largest_theta_rad() const {
@@ -134,14 +124,13 @@ double ArmListener::largest_theta_rad() const {
 
 double ArmListener::fastest_radps() const {
   if (recent_.size() < 2) return 0.0;
-  const double span_s =
-      1e-9 * static_cast<double>(recent_.back().arrival_ns - recent_.front().arrival_ns);
+  const double span_s = to_seconds(recent_.back().arrival_ns - recent_.front().arrival_ns);
   const Eigen::VectorXd moved_rad = recent_.back().u_rad - recent_.front().u_rad;
   double fastest_rad = 0.0;
   for (Eigen::Index k = 0; k + 1 < moved_rad.size(); k += 2)
     fastest_rad = std::max(fastest_rad, moved_rad.segment<2>(k).norm());
   // Frames that a stall delivers all at once are no motion.
-  return span_s > 1e-9 * static_cast<double>(kSpeedSpan_ns) / 2.0 ? fastest_rad / span_s : 0.0;
+  return span_s > to_seconds(kSpeedSpan_ns) / 2.0 ? fastest_rad / span_s : 0.0;
 }
 
 bool ArmListener::daemon_armed(std::int64_t now_ns) const {

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "softarm/base/clock.hpp"
+#include "softarm/base/time.hpp"
 #include "softarm/transport/lcm_node.hpp"
 
 namespace softarm {
@@ -57,7 +58,7 @@ void Commander::vent_to_rest() {
 double Commander::step_s(std::int64_t now_ns) {
   const std::int64_t passed_ns = std::clamp<std::int64_t>(now_ns - updated_ns_, 0, period_ns_);
   updated_ns_ = now_ns;
-  return 1e-9 * static_cast<double>(passed_ns);
+  return to_seconds(passed_ns);
 }
 
 void Commander::send(std::int64_t now_ns) {

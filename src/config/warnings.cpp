@@ -5,11 +5,12 @@
 #include <cmath>
 
 #include "softarm/actuation/pressure_allocator.hpp"
+#include "softarm/base/time.hpp"
 #include "softarm/config/load.hpp"
 #include "softarm/control/gain_check.hpp"
 #include "softarm/control/reference.hpp"
 #include "softarm/model/actuation_matrix.hpp"
-#include "softarm/model/dynamics.hpp"
+#include "softarm/model/statics.hpp"
 #include "softarm/runtime/safety_monitor.hpp"
 #include "softarm/runtime/settings.hpp"
 
@@ -20,21 +21,13 @@ namespace {
 class StaticReach {
  public:
   explicit StaticReach(const Experiment& experiment)
-      : arm_(experiment.arm),
-        workspace_(experiment.arm.size()),
-        allocator_(experiment.actuation),
-        zero_(Eigen::VectorXd::Zero(experiment.arm.dof())) {}
+      : arm_(experiment.arm), workspace_(experiment.arm.size()), allocator_(experiment.actuation) {}
 
   /// The smallest part s of the torque that a segment's chambers give in this pose (2n, rad).
   double scale(const std::vector<double>& u_rad) {
     const Eigen::VectorXd u = Eigen::Map<const Eigen::VectorXd>(u_rad.data(), arm_.dof());
     Eigen::VectorXd force(arm_.dof());
-    const DynamicsTerms gravity_only = {.inertia = false, .coriolis = false, .gravity = true};
-    inverse_dynamics(arm_, workspace_, u, zero_, zero_, zero_, gravity_only, force);
-    for (int i = 0; i < arm_.size(); ++i) {
-      const double k = arm_.segments[static_cast<std::size_t>(i)].stiffness_nm_per_rad;
-      force.segment<2>(2 * i) += k * u.segment<2>(2 * i);
-    }
+    static_moments(arm_, workspace_, u, force);
     Eigen::VectorXd tau(arm_.dof());
     solve_actuation(arm_, u, force, tau);
     Allocation allocation;
@@ -74,7 +67,6 @@ class StaticReach {
   const ArmParameters& arm_;
   DynamicsWorkspace workspace_;
   PressureAllocator allocator_;
-  Eigen::VectorXd zero_;
 };
 
 /// What the configuration declares of the loop, whoever closes it.
@@ -120,9 +112,18 @@ std::vector<std::string> experiment_warnings(const Experiment& experiment) {
 
   const SafetyThresholds thresholds =
       resolve_thresholds(experiment.safety, 1.0 / experiment.rate_hz);
+  const double unanswered_s =
+      (experiment.valves.tolerated_failures + 1) / experiment.valves.rate_hz;
+  if (experiment.safety.valve_readback && unanswered_s >= experiment.safety.valve_silence_s) {
+    warnings.push_back(fmt::format(
+        "valves.tolerated_failures: so many failures last {:.3g} s, daemon.safety.valve_silence_s "
+        "is {:.3g} s: the daemon goes to FAULT before softarm-valves has tolerated them",
+        unanswered_s, experiment.safety.valve_silence_s));
+  }
+
   const MocapSettings& mocap = experiment.plant.mocap;
   const double oldest_s = mocap.latency_s + 1.0 / mocap.rate_hz;
-  const double hold_s = 1e-9 * static_cast<double>(thresholds.hold_after_ns);
+  const double hold_s = to_seconds(thresholds.hold_after_ns);
   if (oldest_s > hold_s) {
     warnings.push_back(fmt::format(
         "plant.mocap: its frames get {:.3g} s old, daemon.safety holds after {:.3g} s: the "

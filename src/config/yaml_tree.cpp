@@ -176,15 +176,10 @@ std::string read_text(const std::filesystem::path& file) {
     throw ConfigError(file.string(), 0, "", "a configuration file", "a folder");
   }
   std::ifstream stream(file, std::ios::binary);
-  constexpr std::size_t kBlock = 16 * 1024;
-  std::string text;
-  while (stream && text.size() <= kMaxFileBytes) {
-    const std::size_t before = text.size();
-    text.resize(before + kBlock);
-    stream.read(text.data() + before, static_cast<std::streamsize>(kBlock));
-    text.resize(before + static_cast<std::size_t>(stream.gcount()));
-  }
-  if (!stream && !stream.eof()) {
+  std::string text(kMaxFileBytes + 1, '\0');
+  stream.read(text.data(), static_cast<std::streamsize>(text.size()));
+  text.resize(static_cast<std::size_t>(stream.gcount()));
+  if (!stream.is_open() || stream.bad()) {
     throw ConfigError(file.string(), 0, "", "a readable file", "no permission to read it");
   }
   if (text.size() > kMaxFileBytes) {

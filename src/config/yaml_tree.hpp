@@ -9,12 +9,9 @@
 #include <string_view>
 #include <vector>
 
-namespace softarm {
+#include "softarm/config/config_keys.hpp"
 
-struct Location {
-  std::shared_ptr<const std::string> file;
-  int line = 0;  ///< 1-based
-};
+namespace softarm {
 
 struct YamlNode {
   enum class Kind { nothing, scalar, list, map };

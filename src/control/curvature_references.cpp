@@ -51,6 +51,8 @@ void check_u(const std::string& where, const std::vector<double>& u_rad, int seg
 
 }  // namespace
 
+void SetPointReference::describe(Keys& key) { describe_pose(key, u_rad, Presence::required); }
+
 void SetPointReference::check(const std::string& where, int segments) const {
   check_u(where, u_rad, segments);
 }
@@ -59,6 +61,16 @@ double SetPointReference::largest_theta_rad() const noexcept { return largest_th
 
 void SetPointReference::evaluate(double, ReferenceSample& out) const noexcept {
   rest_at(u_rad, out);
+}
+
+void PaperReference::describe(Keys& key) {
+  key("theta_rad", theta_rad, from(0, 2 * pi), "theta of every segment after the rise");
+  key("rise_s", rise_s, above(0, 1e3), "time of the rise from theta = 0");
+  key("phi_centre_rad", phi_centre_rad, from(-2 * pi, 2 * pi),
+      "phi_i = centre + amplitude cos(rate t + (i - 1) step)");
+  key("phi_amplitude_rad", phi_amplitude_rad, from(0, 100), "amplitude of phi");
+  key("rate_radps", rate_radps, from(0, 1e3), "rate of phi");
+  key("phase_step_rad", phase_step_rad, from(-2 * pi, 2 * pi), "phase from segment to segment");
 }
 
 void PaperReference::check(const std::string& where, int) const {
@@ -112,6 +124,17 @@ void PaperReference::evaluate(double time_s, ReferenceSample& out) const noexcep
     out.polar_velocity.segment<2>(2 * i) << phi_d, theta_d;
     out.polar_acceleration.segment<2>(2 * i) << phi_dd, theta_dd;
   }
+}
+
+void WayPointReference::describe(Keys& key) {
+  key("repeat", repeat,
+      "start again after the last point, which then equals the first; left out: false");
+  const Key list = {"points", "at rest in each, minimum jerk between them", Presence::required};
+  key.list(list, points, [&](WayPoint& point) {
+    key("time_s", point.time_s, from(0, 1e6), "since the phase began, increasing",
+        Presence::required);
+    describe_pose(key, point.u_rad, Presence::required);
+  });
 }
 
 void WayPointReference::check(const std::string& where, int segments) const {
@@ -172,6 +195,10 @@ void WayPointReference::evaluate(double time_s, ReferenceSample& out) const noex
     out.acceleration[i] = s_dd * way;
   }
   out.has_polar = false;
+}
+
+void LiveReference::describe(Keys& key) {
+  key("timeout_s", timeout_s, above(0, 1e3), "silence after which the last u is held at rest");
 }
 
 void LiveReference::check(const std::string& where, int) const {

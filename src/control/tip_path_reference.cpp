@@ -20,6 +20,16 @@ const char* TipPathReference::name() const noexcept {
   return "tip_lemniscate";
 }
 
+void TipPathReference::describe(Keys& key) {
+  const Form place = from(-1e3, 1e3);
+  key("centre_m", centre_m, place,
+      "of the path, in the world; left out, this and what follows are (22)");
+  if (shape == TipPathShape::point) return;
+  key("first_axis_m", first_axis_m, place, "times cos(rate t)");
+  key("second_axis_m", second_axis_m, place, "times sin(rate t), in a lemniscate sin(2 rate t)");
+  key("rate_radps", rate_radps, from(0, 1e3), "of the path");
+}
+
 void TipPathReference::check(const std::string& where, int) const {
   if (!centre_m.allFinite() || !first_axis_m.allFinite() || !second_axis_m.allFinite() ||
       !std::isfinite(rate_radps)) {

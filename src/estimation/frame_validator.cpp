@@ -6,6 +6,8 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "softarm/base/time.hpp"
+
 namespace softarm {
 namespace {
 
@@ -186,7 +188,7 @@ FrameVerdict FrameValidator::judge_segments(const MocapFrame& frame) noexcept {
       return FrameVerdict::bad_length;
     }
     if (!seen_[i]) continue;
-    const double passed_s = 1e-9 * static_cast<double>(frame.capture_ns - seen_ns_[i]);
+    const double passed_s = to_seconds(frame.capture_ns - seen_ns_[i]);
     const double noise = std::sqrt(candidate_.variance_rad2[i] + seen_variance_rad2_[i]);
     const Eigen::Vector2d u = candidate_.u_rad.segment<2>(2 * static_cast<Eigen::Index>(i));
     jumped = jumped || !((u - seen_u_rad_[i]).norm() <=

@@ -5,13 +5,11 @@
 #include <stdexcept>
 
 #include "softarm/base/clock.hpp"
+#include "softarm/base/time.hpp"
 #include "softarm/runtime/log_row.hpp"
 #include "softarm/simulation/lock_step.hpp"
 
 namespace softarm {
-namespace {
-constexpr std::int64_t kLatestTime_us = 4'000'000'000'000'000;  // nanoseconds must not overflow
-}  // namespace
 
 LoggedRun::LoggedRun(const Experiment& experiment, const std::filesystem::path& log)
     : experiment_(experiment),
@@ -33,7 +31,7 @@ bool LoggedRun::read_frame() {
   for (LogEvent event; log_.next(event);) {
     const auto channel = mocap_.find(event.channel);
     if (!channel) continue;
-    if (event.time_us < 0 || event.time_us >= kLatestTime_us) {
+    if (event.time_us < 0 || !is_time_us(event.time_us)) {
       ++malformed_;
       continue;
     }
@@ -57,12 +55,14 @@ bool LoggedRun::step(LogRow& row, bool logged) {
   TickInput input;
   input.now_ns = now_ns;
   input.frames = frames_;
+  input.newest_measurement_ns = now_ns;  // of valves that are not there
+  operator_.attend(pipeline_.output(), input);
   const std::int64_t before_ns = monotonic_now_ns();
   pipeline_.tick(input);
   tick_times_.add_ns(monotonic_now_ns() - before_ns);
   if (!logged) return true;
   fill_from_pipeline(pipeline_, experiment_.arm, row);
-  row.t_s = 1e-9 * static_cast<double>(now_ns - start_ns_);
+  row.t_s = to_seconds(now_ns - start_ns_);
   row.truth.resize(0);
   row.real.resize(0);
   row.tip.reset();

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "softarm/base/time.hpp"
 #include "softarm/config/load.hpp"
 #include "softarm/transport/message_decoding.hpp"
 #include "softarm/transport/settings.hpp"
@@ -118,7 +119,7 @@ void Replay::begin_run(const tick_record_t& first) {
 void Replay::end_run() {
   if (!running_) return;
   advance(0);
-  summary_.duration_s += 1e-9 * static_cast<double>(last_ns_ - first_ns_);
+  summary_.duration_s += to_seconds(last_ns_ - first_ns_);
   running_ = false;
 }
 
@@ -148,7 +149,7 @@ void Replay::add_gap(std::int64_t first, std::int64_t last, const WaitingRecord&
   ++summary_.gap_count;
   if (summary_.gaps.size() < ReplaySummary::kGapsKept)
     summary_.gaps.push_back(
-        {first, last, next.position, 1e-9 * static_cast<double>(next.message.now_ns - first_ns_)});
+        {first, last, next.position, to_seconds(next.message.now_ns - first_ns_)});
 }
 
 void Replay::run(const WaitingRecord& record) {
@@ -207,7 +208,7 @@ void Replay::note(std::vector<FieldDifference> fields, const WaitingRecord& reco
   if (first.fields.empty()) {
     first.tick = record.tick;
     first.run = summary_.runs;
-    first.time_s = 1e-9 * static_cast<double>(record.message.now_ns - first_ns_);
+    first.time_s = to_seconds(record.message.now_ns - first_ns_);
     first.position = position;
   }
   if (first.tick != record.tick || first.run != summary_.runs) return;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "softarm/base/time.hpp"
 #include "softarm/model/kinematics.hpp"
 #include "softarm/transport/message_decoding.hpp"
 #include "softarm/transport/settings.hpp"
@@ -77,7 +78,8 @@ bool StatusRecord::take(std::string_view channel, std::span<const std::byte> byt
   const LcmSettings& lcm = experiment_.transport.lcm;
   if (channel == lcm.status_channel) return take_status(bytes);
   if (channel == lcm.plant_channel) {
-    if (decode(bytes, plant_message_) && plant_message_.num_segments == experiment_.arm.size())
+    if (decode(bytes, plant_message_) && plant_message_.num_segments == experiment_.arm.size() &&
+        is_time_us(plant_message_.time_us))
       truth_.add(plant_message_);
   } else if (channel == lcm.timing_channel) {
     timing_received_ |= decode(bytes, timing_);
@@ -86,7 +88,9 @@ bool StatusRecord::take(std::string_view channel, std::span<const std::byte> byt
 }
 
 bool StatusRecord::take_status(std::span<const std::byte> bytes) {
-  if (!decode(bytes, decoded_) || decoded_.num_segments != experiment_.arm.size()) return false;
+  if (!decode(bytes, decoded_) || decoded_.num_segments != experiment_.arm.size() ||
+      !is_time_us(decoded_.time_us))
+    return false;
   // A shadow may be watched alone; beside the daemon that moves the arm it is not what is asked
   // for.
   const bool shadow = (decoded_.flags & decoded_.SHADOW) != 0;

@@ -3,18 +3,16 @@
 #include <algorithm>
 #include <cmath>
 
+#include "softarm/base/time.hpp"
 #include "softarm/runtime/settings.hpp"
 
 namespace softarm {
 namespace {
 
-constexpr std::int64_t kNever = SafetyInput::kNever;
 /// The arm may overshoot what its reference may not exceed, by so much.
 constexpr double kSoftLimitMargin = 1.1;
 /// A command that has moved by so much must move the arm, unless the poses are frozen.
 constexpr double kFrozenCommandChange_bar = 0.05;
-
-std::int64_t to_ns(double time_s) noexcept { return std::llround(time_s * 1e9); }
 
 }  // namespace
 
@@ -140,9 +138,9 @@ void ControlPipeline::validate_and_estimate(const TickInput& input, SafetyInput&
   safety.emergency_stop = input.emergency_stop;
   safety.shutdown = input.shutdown;
   output_.soft_limit = safety.soft_limit_exceeded;
-  output_.frame_age_s = newest_capture_ns_ == 0
+  output_.frame_age_s = newest_capture_ns_ == kNever
                             ? std::numeric_limits<double>::quiet_NaN()
-                            : 1e-9 * static_cast<double>(input.now_ns - newest_capture_ns_);
+                            : to_seconds(input.now_ns - newest_capture_ns_);
 }
 
 void ControlPipeline::watch(const TickInput& input, SafetyInput& safety) noexcept {

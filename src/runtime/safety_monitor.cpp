@@ -4,13 +4,14 @@
 #include <array>
 #include <cmath>
 
+#include "softarm/base/time.hpp"
 #include "softarm/runtime/settings.hpp"
 
 namespace softarm {
 namespace {
 
-/// So long after a stop of the daemon what arrives may have been sent before its end: it queues in
-/// the kernel, and is stamped as it leaves that.
+/// So long after a stop of the daemon what is handled may have been sent before its end: it queues
+/// in the kernel.
 constexpr std::int64_t kStale_ns = 500'000'000;
 
 /// Everything a cause may look at.
@@ -98,20 +99,12 @@ constexpr auto kRules = [] {
   return rules;
 }();
 
-/// now - then without overflow where `then` is never.
-std::int64_t age(std::int64_t now_ns, std::int64_t then_ns) noexcept {
-  return then_ns == SafetyInput::kNever ? std::numeric_limits<std::int64_t>::max()
-                                        : now_ns - then_ns;
-}
-
 /// The values named may come off the wire.
 template <class Enumeration, std::size_t count>
 const char* name_of(Enumeration value, const std::array<const char*, count>& names) noexcept {
   const auto index = static_cast<std::size_t>(value);
   return index < count ? names[index] : "unknown";
 }
-
-std::int64_t to_ns(double time_s) noexcept { return std::llround(time_s * 1e9); }
 
 }  // namespace
 
@@ -188,13 +181,13 @@ CauseRule SafetyMonitor::worst_cause(const SafetyInput& input) const noexcept {
       .settings = settings_,
       .thresholds = thresholds_,
       .mode = mode_,
-      .frame_age_ns = age(input.now_ns, input.newest_capture_ns),
+      .frame_age_ns = age_ns(input.now_ns, input.newest_capture_ns),
       .tick_gap_ns = ticked_before ? input.now_ns - previous_tick_ns_ : 0,
       .measurement_age_ns =
-          input.newest_measurement_ns == SafetyInput::kNever
-              ? std::numeric_limits<std::int64_t>::max()
+          input.newest_measurement_ns == kNever
+              ? kForever
               : input.now_ns - std::max(input.newest_measurement_ns, listening_since_ns_),
-      .go_age_ns = age(input.now_ns, input.newest_go_ns)};
+      .go_age_ns = age_ns(input.now_ns, input.newest_go_ns)};
   for (const Cause& cause : kCauses)
     if (cause.present(evidence)) return cause.rule;
   return {Reason::none, Mode::active, Clearance::good_frames};
@@ -244,7 +237,7 @@ Mode SafetyMonitor::step(const SafetyInput& input) noexcept {
   // A run of good frames is one without a cause, a rejection, a gap or silent valves, and begins
   // anew with the arm vented (until then it is moving), and when what queued up is through.
   const bool still_venting = mode_ >= Mode::vent && !input.fully_vented;
-  const bool unheard = settings_.valve_readback && listening_since_ns_ != SafetyInput::kNever &&
+  const bool unheard = settings_.valve_readback && listening_since_ns_ != kNever &&
                        input.newest_measurement_ns <= listening_since_ns_;
   const bool deaf = input.now_ns < deaf_until_ns_;
   if (worst.demands > Mode::active || input.bad_frames > 0 || still_venting || unheard || deaf) {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "simulation/integrator.hpp"
+#include "softarm/actuation/input_map.hpp"
 #include "softarm/simulation/plant_system.hpp"
 
 namespace softarm {
@@ -17,14 +18,6 @@ void expect(bool holds, const std::string& expected, const std::string& got) {
   if (!holds) {
     throw std::invalid_argument("plant: expected " + expected + ", got " + got);
   }
-}
-
-int count_chambers(const ActuationSettings& actuation) {
-  std::size_t count = 0;
-  for (const auto& segment : actuation.segments) {
-    count += segment.size();
-  }
-  return static_cast<int>(count);
 }
 
 const PlantSettings& checked(const PlantSettings& settings) {
@@ -68,32 +61,6 @@ const PlantSettings& checked(const PlantSettings& settings) {
   return settings;
 }
 
-/// Columns -g (cos chi, sin chi) in the rows of the chamber's segment: pressures to generalized
-/// force of A_chamber.
-Eigen::MatrixXd chamber_map(const ActuationSettings& actuation) {
-  Eigen::MatrixXd map = Eigen::MatrixXd::Zero(
-      2 * static_cast<Eigen::Index>(actuation.segments.size()), count_chambers(actuation));
-  if (actuation.kind == ActuationKind::torque) {
-    for (Eigen::Index row = 0; row < map.rows(); row += 2) {
-      const auto& moments = actuation.segments[static_cast<std::size_t>(row / 2)];
-      map(row, row + 1) = moments[1].gain_nm_per_bar;  // A_chamber itself, but for a mismatch
-      map(row + 1, row) = -moments[0].gain_nm_per_bar;
-    }
-    return map;
-  }
-  Eigen::Index column = 0;
-  Eigen::Index row = 0;
-  for (const auto& segment : actuation.segments) {
-    for (const Chamber& chamber : segment) {
-      map(row, column) = -chamber.gain_nm_per_bar * std::cos(chamber.angle_rad);
-      map(row + 1, column) = -chamber.gain_nm_per_bar * std::sin(chamber.angle_rad);
-      ++column;
-    }
-    row += 2;
-  }
-  return map;
-}
-
 IntegratorSettings integrator_settings(const PlantSettings& settings) {
   return {.method = settings.method,
           .relative_tolerance = settings.relative_tolerance,
@@ -110,9 +77,9 @@ struct ArmPlant::Implementation {
       : arm(checked(settings).arm),
         lag_s(settings.valves.lag_s),
         dead_time_s(settings.valves.dead_time_s),
-        valves(settings.valves, count_chambers(settings.actuation),
+        valves(settings.valves, chamber_count(settings.actuation),
                settings.actuation.kind == ActuationKind::torque),
-        map(chamber_map(settings.actuation)),
+        map(input_map(settings.actuation)),
         system(settings.kind.make(settings)),
         integrator(make_integrator(*system, integrator_settings(settings))),
         present_nm(Eigen::VectorXd::Zero(arm.dof())),

@@ -12,7 +12,7 @@
 namespace softarm {
 namespace {
 
-constexpr double kNever = std::numeric_limits<double>::infinity();
+constexpr double kForever_s = std::numeric_limits<double>::infinity();
 
 void require(bool holds, const std::string& key, const std::string& expected,
              const std::string& got) {
@@ -37,7 +37,7 @@ ExternalLoads::Load checked(const ExternalLoad& load, int segments) {
           .moment_nm = load.moment_nm,
           .shape = load.shape,
           .start_s = load.start_s,
-          .end_s = load.duration_s > 0.0 ? load.start_s + load.duration_s : kNever,
+          .end_s = load.duration_s > 0.0 ? load.start_s + load.duration_s : kForever_s,
           .on = false};
 }
 
@@ -65,7 +65,7 @@ double ExternalLoads::scale(const Load& load, double t_s) {
 }
 
 double ExternalLoads::until(double t_s) const {
-  double next = kNever;
+  double next = kForever_s;
   for (const Load& load : loads_) {
     for (const double instant : {load.start_s, load.end_s}) {
       if (instant > t_s) next = std::min(next, instant);

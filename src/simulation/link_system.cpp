@@ -5,6 +5,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "softarm/base/keys.hpp"
+
 namespace softarm {
 namespace {
 
@@ -31,6 +33,16 @@ inline LinkSystem::Vec3 LinkSystem::out_of(const Turn& t, const Vec3& v) {
   const double x = t.cb * v.x() + t.sb * v.z();
   const double z = t.cb * v.z() - t.sb * v.x();
   return {x, t.ca * v.y() - t.sa * z, t.sa * v.y() + t.ca * z};
+}
+
+void LinkSettings::describe(Keys& key) {
+  key("links_per_segment", links_per_segment, from(1, kMaxLinksPerSegment),
+      "each with two crossed revolute joints at its start");
+  key("joints", joints, one_of({"crossed"}), "crossed: two angles, about x and y");
+  key("joint_stiffness_nm_per_rad", joint_stiffness_nm_per_rad, from(0, 1e6),
+      "of every joint about each axis; left out: k times links_per_segment");
+  key("joint_damping_nms_per_rad", joint_damping_nms_per_rad, from(0, 1e6),
+      "the same; left out: beta times links_per_segment");
 }
 
 std::unique_ptr<PlantSystem> LinkSettings::make(const PlantSettings& settings) const {

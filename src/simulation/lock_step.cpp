@@ -23,19 +23,14 @@ bool LockStep::step(LogRow& row, bool logged) {
   TickInput input;
   input.now_ns = now_ns;
   input.frames = frames_;
-  input.newest_go_ns = now_ns;  // nobody has to hold a button while nothing moves
+  operator_.attend(pipeline_.output(), input);
   measured_ = arm_.measured_pressures_bar().cast<float>().cast<double>();  // as valves publish them
   input.newest_measurement_ns = now_ns;
   input.measured_bar = &measured_;
   const TickOutput& output = pipeline_.tick(input);
   tick_times_.add_ns(monotonic_now_ns() - before_ns);
 
-  pressures_.assign(output.pressure_bar.begin(), output.pressure_bar.end());
-  arm_.command({.sequence = ticks_,
-                .validity_ns = validity_ns_,
-                .shadow = false,
-                .pressure_bar = pressures_},
-               now_ns);
+  arm_.command(output.pressure_bar, validity_ns_, now_ns);
   if (logged) {
     arm_.advance_to(now_ns + pipeline_.period_ns() / 2);
     fill(row);
@@ -45,7 +40,7 @@ bool LockStep::step(LogRow& row, bool logged) {
 
 void LockStep::fill(LogRow& row) const {
   fill_from_pipeline(pipeline_, model_, row);
-  row.t_s = 1e-9 * static_cast<double>(arm_.time_ns());
+  row.t_s = to_seconds(arm_.time_ns());
   row.truth = arm_.plant().u_rad();
   row.real = arm_.measured_pressures_bar();
   row.tip = arm_.plant().tip_m();

@@ -5,6 +5,7 @@
 #include "softarm/model/actuation_matrix.hpp"
 #include "softarm/model/kinematics.hpp"
 #include "softarm/model/segment.hpp"
+#include "softarm/model/statics.hpp"
 
 namespace softarm {
 
@@ -133,8 +134,7 @@ SecondOrderSystem::Powers PccSystem::powers(double t_s, ConstVector u, ConstVect
     // Inertia forces of the base's acceleration, the only weight in this.
     arm_.gravity_mps2 = -external_loads_.base_acceleration_mps2(t_s);
     above_.setZero();
-    const DynamicsTerms weight = {.inertia = false, .coriolis = false, .gravity = true};
-    inverse_dynamics(arm_, workspace_, u, above_, above_, above_, weight, below_);
+    gravity_moments(arm_, workspace_, u, below_);
     if (loads_.has_payload()) loads_.add_payload(u, above_, above_, arm_.gravity_mps2, below_);
     sum_ -= below_;
   }

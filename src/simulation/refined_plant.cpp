@@ -4,6 +4,7 @@
 #include <string>
 
 #include "simulation/pcc_system.hpp"
+#include "softarm/base/keys.hpp"
 #include "softarm/simulation/settings.hpp"
 
 namespace softarm {
@@ -33,6 +34,18 @@ std::vector<double> parts(const std::vector<double>& weights, int pieces, const 
 }
 
 }  // namespace
+
+void RefinedSettings::describe(Keys& key) {
+  key("pieces", pieces, from(1, kMaxSegments), "a segment");
+  for (auto* weights : {&length_weights, &mass_weights, &rigidity_weights})
+    weights->resize(static_cast<std::size_t>(pieces), 1.0);
+  const Form weights = above(0, 1e6).one_or_each();
+  key("length_weights", length_weights, weights,
+      "of the pieces of a segment, base to tip; their ratios count");
+  key("mass_weights", mass_weights, weights, "the same");
+  key("rigidity_weights", rigidity_weights, weights,
+      "of E I, and of damping alike; the segment's k and beta stay");
+}
 
 std::unique_ptr<PlantSystem> RefinedSettings::make(const PlantSettings& settings) const {
   if (pieces < 1 || pieces * settings.arm.size() > kMaxSegments) {

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <span>
 
+#include "softarm/base/time.hpp"
+
 namespace softarm {
 namespace {
 
@@ -24,7 +26,7 @@ SimulatedArm::SimulatedArm(const PlantSettings& settings, std::int64_t start_ns,
 }
 
 void SimulatedArm::advance_plant(std::int64_t t_ns) {
-  plant_.advance(static_cast<double>(t_ns - start_ns_) * 1e-9);
+  plant_.advance(to_seconds(t_ns - start_ns_));
   now_ns_ = t_ns;
 }
 
@@ -55,6 +57,16 @@ CommandVerdict SimulatedArm::command(const PressureCommand& command, std::int64_
     plant_.command(as_span(expiry_.set_points_bar()));
   }
   return verdict;
+}
+
+CommandVerdict SimulatedArm::command(const PressureVector& pressure_bar, std::int64_t validity_ns,
+                                     std::int64_t arrival_ns) {
+  advance_to(arrival_ns);
+  const std::span<const double> pressures(pressure_bar.data(),
+                                          static_cast<std::size_t>(pressure_bar.size()));
+  return command(
+      {.sequence = sequence() + 1, .validity_ns = validity_ns, .pressure_bar = pressures},
+      arrival_ns);
 }
 
 std::int64_t SimulatedArm::next_event_ns() const noexcept {

@@ -1,10 +1,10 @@
 #include "softarm/transport/daemon_link.hpp"
 
-#include <time.h>
-
 #include <algorithm>
 #include <cmath>
 
+#include "softarm/base/clock.hpp"
+#include "softarm/base/time.hpp"
 #include "softarm/runtime/settings.hpp"
 #include "softarm/transport/message_decoding.hpp"
 #include "softarm/transport/settings.hpp"
@@ -15,15 +15,8 @@ namespace {
 /// What may arrive between two ticks; more is dropped by LCM and counted as missing.
 constexpr int kFrameCapacity = TickRecorder::kMostFrames;
 constexpr int kOtherCapacity = 16;
-constexpr auto kNever = std::numeric_limits<std::int64_t>::min();
 /// After so long a silence a sender of references or requests may begin its numbers anew.
 constexpr std::int64_t kNumberForgotten_ns = 500'000'000;
-
-std::int64_t wall_clock_ns() noexcept {
-  timespec now{};
-  clock_gettime(CLOCK_REALTIME, &now);
-  return std::int64_t{now.tv_sec} * 1'000'000'000 + now.tv_nsec;
-}
 
 }  // namespace
 
@@ -65,9 +58,7 @@ DaemonLink::DaemonLink(const PipelineSettings& settings, const TransportSettings
 }
 
 TickInput DaemonLink::collect(std::int64_t now_ns) noexcept {
-  previous_collect_ns_ = now_ns_;
   now_ns_ = now_ns;
-  wall_minus_monotonic_ns_ = wall_clock_ns() - now_ns;
   frame_count_ = 0;
   input_ = {};
   input_.now_ns = now_ns;
@@ -81,11 +72,9 @@ TickInput DaemonLink::collect(std::int64_t now_ns) noexcept {
   return input_;
 }
 
-/// LCM stamps arrivals with the wall clock. Brought to ours they can only lie between the last
-/// collection and now: so a wall clock that is set meanwhile does no harm.
+/// What comes in while the queue is emptied belongs to this tick as well.
 std::int64_t DaemonLink::arrival_ns(const ReceivedMessage& packet) const noexcept {
-  const std::int64_t arrival = packet.arrival_utime_us * 1000 - wall_minus_monotonic_ns_;
-  return std::clamp(arrival, previous_collect_ns_, now_ns_);
+  return std::min(packet.arrival_ns, now_ns_);
 }
 
 void DaemonLink::take_frame(std::size_t channel, const ReceivedMessage& packet) noexcept {
@@ -101,7 +90,7 @@ void DaemonLink::take_reference(const ReceivedMessage& packet) noexcept {
     ++malformed_;
     return;
   }
-  const bool forgotten = now_ns_ - newest_reference_ns_ > kNumberForgotten_ns;
+  const bool forgotten = age_ns(now_ns_, newest_reference_ns_) > kNumberForgotten_ns;
   if (reference_message_.sequence <= reference_sequence_ && !forgotten) return;
   reference_sequence_ = reference_message_.sequence;
   newest_reference_ns_ = now_ns_;
@@ -119,7 +108,7 @@ void DaemonLink::take_operator(const ReceivedMessage& packet) noexcept {
     return;
   }
   const bool newer = operator_message_.sequence > operator_sequence_ ||
-                     now_ns_ - newest_operator_ns_ > kNumberForgotten_ns;
+                     age_ns(now_ns_, newest_operator_ns_) > kNumberForgotten_ns;
   if (newer) operator_sequence_ = operator_message_.sequence;
   newest_operator_ns_ = now_ns_;
   // Whoever wants the arm vented is right, whatever the number; so is a request nobody knows.
@@ -172,7 +161,7 @@ void DaemonLink::publish_command(std::int64_t now_ns, const TickOutput& output) 
 }
 
 bool DaemonLink::command_expired(std::int64_t now_us) const noexcept {
-  return now_us - sent_us_ >= messages_.pressure_command.validity_us;
+  return sent_us_ == kNever || now_us - sent_us_ >= messages_.pressure_command.validity_us;
 }
 
 void DaemonLink::publish_status(std::int64_t now_ns, const ControlPipeline& pipeline,

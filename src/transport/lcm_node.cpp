@@ -25,18 +25,15 @@ std::string quoted(const std::string& channel) {
   return pattern;
 }
 
-/// noexcept: nothing may unwind through LCM's C code, where it would leave a lock behind.
-void dispatch(const lcm_recv_buf_t* packet, const char* /*channel*/, void* user) noexcept {
-  // A packet with an unterminated channel name has been seen to claim 2^32 - 1 bytes.
-  if (packet->data == nullptr || packet->data_size > LcmNode::kLargestMessage) return;
-  const auto& handler = *static_cast<const LcmNode::Handler*>(user);
-  handler({.bytes = {static_cast<const std::byte*>(packet->data), packet->data_size},
-           .arrival_utime_us = packet->recv_utime});
+ArrivalClock clock_from_now() noexcept {
+  const ClockPair now = read_clocks();
+  return {now.monotonic_ns, now.wall_ns};
 }
 
 }  // namespace
 
-LcmNode::LcmNode(const std::string& url) : lcm_(lcm_create(url.c_str())), buffer_(kLargestMessage) {
+LcmNode::LcmNode(const std::string& url)
+    : lcm_(lcm_create(url.c_str())), arrivals_(clock_from_now()), buffer_(kLargestMessage) {
   if (lcm_ == nullptr)
     throw TransportError("LCM cannot start on \"" + url +
                          "\". Without a multicast route give this machine one: "
@@ -45,8 +42,22 @@ LcmNode::LcmNode(const std::string& url) : lcm_(lcm_create(url.c_str())), buffer
 
 LcmNode::~LcmNode() { lcm_destroy(lcm_); }
 
+void LcmNode::look_at_clocks() noexcept {
+  const ClockPair now = read_clocks();
+  arrivals_.look(now.monotonic_ns, now.wall_ns);
+}
+
+/// noexcept: nothing may unwind through LCM's C code, where it would leave a lock behind.
+void LcmNode::dispatch(const lcm_recv_buf_t* packet, const char* /*channel*/, void* user) noexcept {
+  // A packet with an unterminated channel name has been seen to claim 2^32 - 1 bytes.
+  if (packet->data == nullptr || packet->data_size > LcmNode::kLargestMessage) return;
+  const auto& subscription = *static_cast<const Subscription*>(user);
+  subscription.handler({.bytes = {static_cast<const std::byte*>(packet->data), packet->data_size},
+                        .arrival_ns = subscription.arrivals->arrival_ns(packet->recv_utime)});
+}
+
 void LcmNode::subscribe(const std::string& channel, int capacity, Handler handler) {
-  Handler& stored = handlers_.emplace_back(std::move(handler));
+  Subscription& stored = subscriptions_.emplace_back(std::move(handler), &arrivals_);
   lcm_subscription_t* subscription =
       lcm_subscribe(lcm_, quoted(channel).c_str(), dispatch, &stored);
   if (subscription == nullptr)
@@ -57,6 +68,7 @@ void LcmNode::subscribe(const std::string& channel, int capacity, Handler handle
 }
 
 int LcmNode::drain(int limit) noexcept {
+  look_at_clocks();
   int handled = 0;
   while (handled < limit && lcm_handle_timeout(lcm_, 0) > 0) ++handled;
   return handled;
@@ -64,10 +76,11 @@ int LcmNode::drain(int limit) noexcept {
 
 bool LcmNode::wait_until(std::int64_t deadline_ns) noexcept {
   // lcm_handle_timeout counts in milliseconds, which is too coarse for a plant in real time.
-  const std::int64_t left_ns = std::max<std::int64_t>(0, deadline_ns - monotonic_now_ns());
-  const timespec timeout{.tv_sec = left_ns / 1'000'000'000, .tv_nsec = left_ns % 1'000'000'000};
+  const timespec timeout = time_left(deadline_ns);
   pollfd descriptor{.fd = lcm_get_fileno(lcm_), .events = POLLIN, .revents = 0};
-  return ppoll(&descriptor, 1, &timeout, nullptr) > 0 && lcm_handle_timeout(lcm_, 0) > 0;
+  if (ppoll(&descriptor, 1, &timeout, nullptr) <= 0) return false;
+  look_at_clocks();
+  return lcm_handle_timeout(lcm_, 0) > 0;
 }
 
 bool LcmNode::publish_encoded(const std::string& channel,

@@ -2,13 +2,14 @@
 
 #include <algorithm>
 
+#include "softarm/base/time.hpp"
 #include "softarm/runtime/settings.hpp"
 #include "softarm/transport/settings.hpp"
 
 namespace softarm {
 namespace {
 
-constexpr std::int64_t kLatestStamp_us = 4'000'000'000'000'000;  // nanoseconds must not overflow
+constexpr std::int64_t kNonsense_us = kLatest_us + 1;  // no clock relation takes it
 
 }  // namespace
 
@@ -44,7 +45,7 @@ MocapReceipt MocapSource::take(std::size_t channel, std::span<const std::byte> b
   if (!format_->decode(bytes, *sent_)) return MocapReceipt::malformed;
   if (kind_.channel_per_body) return take_body(channel, arrival_ns, frame);
   adapter_.to_frame(*sent_, frame);
-  sender_time_us_ = sent_->sender_time_us;
+  sender_time_us_ = is_time_us(sent_->sender_time_us) ? sent_->sender_time_us : kNonsense_us;
   frame.capture_ns = clock_.capture_ns(arrival_ns, sender_time_us_);
   return MocapReceipt::frame;
 }
@@ -52,8 +53,7 @@ MocapReceipt MocapSource::take(std::size_t channel, std::span<const std::byte> b
 MocapReceipt MocapSource::take_body(std::size_t channel, std::int64_t arrival_ns,
                                     MocapFrame& frame) noexcept {
   const std::int64_t stamp_us = sent_->sender_time_us;
-  if (channel >= channels_.size() || sent_->bodies != 1 || stamp_us > kLatestStamp_us ||
-      stamp_us < -kLatestStamp_us)
+  if (channel >= channels_.size() || sent_->bodies != 1 || !is_time_us(stamp_us))
     return MocapReceipt::malformed;
   const std::size_t body = channel + (adapter_.base_is_fixed() ? 1 : 0);
   const auto outcome =

@@ -6,6 +6,7 @@
 #include <softarm_messages/optitrack_frame_t.hpp>
 #include <type_traits>
 
+#include "softarm/base/time.hpp"
 #include "transport/lcm_mocap_format.hpp"
 
 namespace softarm {
@@ -101,11 +102,11 @@ void skip_skeletons(Cursor& cursor) {
   }
 }
 
-constexpr double kLatestStamp_us = 4e15;  // beyond what a clock relation takes, it is nonsense
-
+/// What no clock relation takes where the time is nonsense.
 std::int64_t to_us(double time_s) noexcept {
   const double time_us = 1e6 * time_s;
-  return std::llround(std::abs(time_us) <= kLatestStamp_us ? time_us : kLatestStamp_us + 1.0);
+  return std::abs(time_us) <= static_cast<double>(kLatest_us) ? std::llround(time_us)
+                                                              : kLatest_us + 1;
 }
 
 class OptitrackFormat final : public LcmMocapFormat<softarm_messages::optitrack_frame_t> {

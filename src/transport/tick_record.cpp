@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "softarm/base/hash.hpp"
 #include "softarm/runtime/settings.hpp"
 #include "softarm/transport/lcm_node.hpp"
 
@@ -13,13 +14,6 @@ using softarm_messages::tick_frame_t;
 using softarm_messages::tick_record_t;
 
 constexpr std::size_t kDigest = 8;  ///< at the end of every record
-
-std::uint64_t fnv1a(std::span<const std::byte> bytes) noexcept {
-  std::uint64_t hash = 14695981039346656037ull;
-  for (const std::byte each : bytes)
-    hash = (hash ^ std::to_integer<std::uint64_t>(each)) * 1099511628211ull;
-  return hash;
-}
 
 void put_digest(std::span<std::byte> encoded) noexcept {
   std::uint64_t digest = fnv1a(encoded.first(encoded.size() - kDigest));

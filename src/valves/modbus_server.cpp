@@ -18,6 +18,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "softarm/base/clock.hpp"
+
 namespace softarm {
 namespace {
 
@@ -90,11 +92,7 @@ ModbusServer::~ModbusServer() {
 }
 
 int ModbusServer::poll_until(std::int64_t deadline_ns) noexcept {
-  timespec now{};
-  clock_gettime(CLOCK_MONOTONIC, &now);
-  const std::int64_t left_ns = std::max<std::int64_t>(
-      0, deadline_ns - (std::int64_t{now.tv_sec} * 1'000'000'000 + now.tv_nsec));
-  const timespec timeout{.tv_sec = left_ns / 1'000'000'000, .tv_nsec = left_ns % 1'000'000'000};
+  const timespec timeout = time_left(deadline_ns);
   std::array<pollfd, kMaxClients + 1> descriptors{};
   descriptors[0] = {.fd = listener_, .events = POLLIN, .revents = 0};
   for (std::size_t k = 0; k < clients_.size(); ++k)

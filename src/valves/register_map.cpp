@@ -151,6 +151,7 @@ void take_read_back(const RegisterMap& map, std::span<const int> order,
                     std::span<const std::uint16_t> words, ReadBack& read_back) noexcept {
   read_back.ready = true;
   read_back.has_echo = map.echo_word >= 0;
+  read_back.resolution_bar = 1.0 / map.units_per_bar;
   for (std::size_t i = 0; i < order.size(); ++i) {
     const Place place = place_of(map, order[i]);
     const auto word = [&](int k) { return words[word_of(place.slot, map.read_words, k)]; };

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "softarm/base/time.hpp"
+
 namespace softarm {
 namespace {
 
@@ -12,15 +14,11 @@ constexpr std::int64_t kMostExceptions_ns = 1'000'000'000;
 constexpr double kGoodFor_s = 0.25;
 constexpr int kStartCycles = 3;
 
-std::int64_t to_ns(double seconds) {
-  return static_cast<std::int64_t>(std::llround(1e9 * seconds));
-}
-
 }  // namespace
 
 const char* name(ValveState state) noexcept {
   constexpr const char* kNames[] = {"DISCONNECTED", "SECURING", "STARTING",
-                                    "VENTED",       "RUNNING",  "DOUBT"};
+                                    "VENTED",       "RUNNING",  "DEGRADED"};
   return kNames[static_cast<int>(state)];
 }
 
@@ -55,7 +53,7 @@ ValveGuard::ValveGuard(const ValveGuardSettings& settings)
       backoff_ns_(first_backoff_ns_),
       must_see_zero_(settings.wait_for_zero),
       set_points_bar_(Eigen::VectorXd::Zero(settings.chambers)),
-      off_since_ns_(static_cast<std::size_t>(settings.chambers), kLongAgo) {}
+      off_since_ns_(static_cast<std::size_t>(settings.chambers), kNever) {}
 
 void ValveGuard::enter(ValveState state, ValveReason reason) noexcept {
   state_ = state;
@@ -67,7 +65,7 @@ void ValveGuard::enter(ValveState state, ValveReason reason) noexcept {
 }
 
 void ValveGuard::disconnect(ValveReason reason, std::int64_t now_ns) noexcept {
-  if (settings_.wait_for_zero && (state_ == ValveState::running || state_ == ValveState::doubt))
+  if (settings_.wait_for_zero && (state_ == ValveState::running || state_ == ValveState::degraded))
     wait_for_zero();
   if (reason == ValveReason::failsafe_refused) backoff_ns_ = longest_backoff_ns_;
   next_attempt_ns_ = now_ns + backoff_ns_;
@@ -75,23 +73,23 @@ void ValveGuard::disconnect(ValveReason reason, std::int64_t now_ns) noexcept {
   enter(ValveState::disconnected, reason);
 }
 
-void ValveGuard::doubt(ValveReason reason, int chamber) noexcept {
+void ValveGuard::degrade(ValveReason reason, int chamber) noexcept {
   // A stuck valve would be found only by raising the pressure once more: someone has to look first.
   if (settings_.wait_for_zero || reason == ValveReason::stuck_valve) wait_for_zero();
-  if (state_ != ValveState::doubt) ++counters_.doubts;
+  if (state_ != ValveState::degraded) ++counters_.times_degraded;
   good_cycles_ = 0;
   chamber_ = chamber;
-  enter(ValveState::doubt, reason);
+  enter(ValveState::degraded, reason);
 }
 
 bool ValveGuard::wake(std::int64_t now_ns) noexcept {
-  bool gap = woken_ns_ != kLongAgo && now_ns - woken_ns_ > gap_ns_;
+  bool gap = woken_ns_ != kNever && now_ns - woken_ns_ > gap_ns_;
   // However the time went by since the terminal answered last, it has vented by itself.
   gap |= state_ == ValveState::running && now_ns - answered_ns_ >= failsafe_ns_;
   woken_ns_ = now_ns;
-  // Without a connection there is nothing to doubt, and connecting itself takes time.
+  // Without a connection no pressure is there to lose, and connecting itself takes time.
   if (gap && (state_ == ValveState::running || state_ == ValveState::vented))
-    doubt(ValveReason::time_gap, -1);
+    degrade(ValveReason::time_gap, -1);
   return !gap;
 }
 
@@ -111,12 +109,12 @@ ValveAction ValveGuard::next(std::int64_t now_ns) noexcept {
 
 void ValveGuard::wait_for_zero() noexcept {
   must_see_zero_ = true;
-  listening_since_ns_ = kLongAgo;
+  listening_since_ns_ = kNever;
 }
 
 void ValveGuard::update_running(std::int64_t now_ns) noexcept {
   const bool commanded = !expiry_.vented();
-  if (listening_since_ns_ == kLongAgo) listening_since_ns_ = now_ns;
+  if (listening_since_ns_ == kNever) listening_since_ns_ = now_ns;
   // What we could not hear is no silence of the controller.
   const bool silent = !commanded && now_ns - listening_since_ns_ >= validity_ns_;
   if (silent || (commanded && expiry_.set_points_bar().maxCoeff() <= 0.0)) must_see_zero_ = false;
@@ -136,9 +134,7 @@ void ValveGuard::update_running(std::int64_t now_ns) noexcept {
 
 void ValveGuard::update_set_points(std::int64_t now_ns) noexcept {
   const double passed_s =
-      written_ns_ == kLongAgo
-          ? 0.0
-          : 1e-9 * static_cast<double>(std::min(now_ns - written_ns_, 2 * period_ns_));
+      written_ns_ == kNever ? 0.0 : to_seconds(std::min(now_ns - written_ns_, 2 * period_ns_));
   written_ns_ = now_ns;
   if (state_ != ValveState::running) return;
   const double rise_bar =
@@ -157,14 +153,14 @@ void ValveGuard::connected(bool success, std::int64_t now_ns) noexcept {
   ++counters_.connections;
   failures_ = 0;
   good_cycles_ = 0;
-  since_ns_ = now_ns;
   enter(ValveState::securing, ValveReason::none);
 }
 
 void ValveGuard::secured(LinkResult result, bool as_written, std::int64_t now_ns) noexcept {
   if (result == LinkResult::ok && as_written) {
-    since_ns_ = now_ns;
-    std::fill(off_since_ns_.begin(), off_since_ns_.end(), kLongAgo);
+    failures_ = 0;
+    starting_since_ns_ = now_ns;
+    std::fill(off_since_ns_.begin(), off_since_ns_.end(), kNever);
     return enter(ValveState::starting, ValveReason::not_ready);
   }
   counters_.exceptions += result == LinkResult::exception_reply;
@@ -185,14 +181,14 @@ void ValveGuard::failed(LinkResult result, std::int64_t now_ns) noexcept {
   counters_.broken += result == LinkResult::broken;
   if (result == LinkResult::broken) return disconnect(ValveReason::no_connection, now_ns);
   good_cycles_ = 0;
-  if (failures_++ == 0) since_ns_ = now_ns;
+  if (failures_++ == 0) failing_since_ns_ = now_ns;
   if (failures_ <= settings_.driver.tolerated_failures) return;
   if (result == LinkResult::no_answer) return disconnect(ValveReason::no_answer, now_ns);
   // It answers, so zero may still reach it; a terminal that refuses that too is left to its own
   // time-out.
-  if (now_ns - since_ns_ > kMostExceptions_ns)
+  if (now_ns - failing_since_ns_ > kMostExceptions_ns)
     return disconnect(ValveReason::exception_reply, now_ns);
-  doubt(ValveReason::exception_reply, -1);
+  degrade(ValveReason::exception_reply, -1);
 }
 
 ValveReason ValveGuard::fault(const ReadBack& read_back, int& chamber) const noexcept {
@@ -212,8 +208,8 @@ int ValveGuard::stuck_chamber(const ReadBack& read_back, std::int64_t now_ns) no
     if (read_back.has_echo)
       off_bar = std::max(off_bar, std::abs(read_back.echo_bar[at] - set_points_bar_[at]));
     if (off_bar <= settings_.driver.stuck_bar) {
-      off_since_ns_[i] = kLongAgo;
-    } else if (off_since_ns_[i] == kLongAgo) {
+      off_since_ns_[i] = kNever;
+    } else if (off_since_ns_[i] == kNever) {
       off_since_ns_[i] = now_ns;
     } else if (now_ns - off_since_ns_[i] > stuck_after_ns_ && stuck < 0) {
       stuck = static_cast<int>(i);
@@ -227,12 +223,10 @@ void ValveGuard::exchanged(LinkResult result, const ReadBack& read_back,
   if (result != LinkResult::ok) return failed(result, now_ns);
   ++counters_.cycles;
   answered_ns_ = now_ns;
-  if (failures_ > 0) since_ns_ = now_ns;
   failures_ = 0;
   const bool zero = set_points_bar_.maxCoeff() <= 0.0;
-  const double unit_bar = 1.0 / settings_.driver.registers.units_per_bar;
-  zero_confirmed_ =
-      zero && (!read_back.has_echo || read_back.echo_bar.cwiseAbs().maxCoeff() <= unit_bar);
+  zero_confirmed_ = zero && (!read_back.has_echo ||
+                             read_back.echo_bar.cwiseAbs().maxCoeff() <= read_back.resolution_bar);
 
   int chamber = -1;
   ValveReason wrong = fault(read_back, chamber);
@@ -246,21 +240,21 @@ void ValveGuard::exchanged(LinkResult result, const ReadBack& read_back,
     if (wrong != ValveReason::none && wrong != ValveReason::stuck_valve) {
       reason_ = wrong;
       good_cycles_ = 0;
-      if (now_ns - since_ns_ > kMostStarting_ns) disconnect(wrong, now_ns);
+      if (now_ns - starting_since_ns_ > kMostStarting_ns) disconnect(wrong, now_ns);
     } else if (++good_cycles_ >= kStartCycles) {
       backoff_ns_ = first_backoff_ns_;
       enter(ValveState::vented, stopping_ ? ValveReason::shutdown : ValveReason::no_command);
     }
     return;
   }
-  if (wrong != ValveReason::none) return doubt(wrong, chamber);
-  if (state_ != ValveState::doubt) {
+  if (wrong != ValveReason::none) return degrade(wrong, chamber);
+  if (state_ != ValveState::degraded) {
     chamber_ = stuck;  // where stuck valves are only reported
     return;
   }
   // A valve that was stuck has to follow again before it counts as good.
   const bool follows = std::all_of(off_since_ns_.begin(), off_since_ns_.end(),
-                                   [](std::int64_t since) { return since == kLongAgo; });
+                                   [](std::int64_t since) { return since == kNever; });
   good_cycles_ = follows || reason_ != ValveReason::stuck_valve ? good_cycles_ + 1 : 0;
   if (good_cycles_ < good_cycles_needed_) return;
   chamber_ = -1;

@@ -2,6 +2,7 @@
 // runs, for that program alone. The monotonic clock is left as it is.
 #include <fcntl.h>
 #include <sys/mman.h>
+#include <sys/socket.h>
 #include <sys/syscall.h>
 #include <sys/time.h>
 #include <time.h>
@@ -10,6 +11,7 @@
 #include <atomic>
 #include <cstdint>
 #include <cstdlib>
+#include <cstring>
 
 namespace {
 
@@ -56,4 +58,18 @@ extern "C" time_t time(time_t* out) noexcept {
   clock_gettime(CLOCK_REALTIME, &now);
   if (out != nullptr) *out = now.tv_sec;
   return now.tv_sec;
+}
+
+// The kernel stamps packets with its wall clock as they come in: SO_TIMESTAMP, which LCM asks for.
+extern "C" ssize_t recvmsg(int socket, msghdr* message, int flags) {
+  const ssize_t result = syscall(SYS_recvmsg, socket, message, flags);
+  if (result < 0) return result;
+  for (cmsghdr* part = CMSG_FIRSTHDR(message); part != nullptr; part = CMSG_NXTHDR(message, part)) {
+    if (part->cmsg_level != SOL_SOCKET || part->cmsg_type != SCM_TIMESTAMP) continue;
+    timeval stamp{};
+    std::memcpy(&stamp, CMSG_DATA(part), sizeof stamp);
+    stamp.tv_sec += offset_s();
+    std::memcpy(CMSG_DATA(part), &stamp, sizeof stamp);
+  }
+  return result;
 }

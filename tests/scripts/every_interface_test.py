@@ -54,7 +54,7 @@ class EveryInterface(unittest.TestCase):
         plain = ((PROGRAMS / "softarmd", ours), (PROGRAMS / "softarm-plant", ours))
         foreign = ((PROGRAMS / "softarmd", every),
                    (PROGRAMS / "softarm-plant", "--modbus", port, self.config("paper_arm_modbus", valves)),
-                   (PYTHON, "-B", ROOT / "docs/examples/republish.py", "--url", self.url),
+                   (PYTHON, "-B", ROOT / "examples/republish.py", "--url", self.url),
                    (PROGRAMS / "softarm-valves", every))
         ratios = []
         for k in range(ROUNDS):

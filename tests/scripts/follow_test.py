@@ -1,4 +1,4 @@
-"""docs/examples/follow.py moves the simulated arm in a circle. Argument: folder of the programs.
+"""examples/follow.py moves the simulated arm in a circle. Argument: folder of the programs.
 
 Runs in the Python of tools/python_environment, which has the package lcm; skipped where that was not made.
 """
@@ -12,7 +12,7 @@ import unittest
 
 from running_arm import PYTHON, ROOT, go_on_in_our_python, own_url, skip_without_multicast, start, write_config
 
-EXAMPLE = ROOT / "docs/examples/follow.py"
+EXAMPLE = ROOT / "examples/follow.py"
 
 skip_without_multicast()
 go_on_in_our_python()

@@ -1,4 +1,4 @@
-"""Every command of docs/laboratory.md, as printed, in one shell, against the simulated arm. Argument: folder of the programs."""
+"""Every command of docs/tutorial/laboratory.md, as printed, in one shell, against the simulated arm. Argument: folder of the programs."""
 import os
 import pathlib
 import re
@@ -11,7 +11,7 @@ import unittest
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 PROGRAMS = pathlib.Path(sys.argv.pop(1))
 PATIENCE_S = 300
-PAGE = ROOT / "docs/laboratory.md"
+PAGE = ROOT / "docs/tutorial/laboratory.md"
 
 if subprocess.run([ROOT / "tools/with_loopback_network", "true"], capture_output=True, check=False).returncode != 0:
     print("skipped: no network of our own can be made here, and there is no multicast route")
@@ -20,7 +20,7 @@ if subprocess.run([ROOT / "tools/with_loopback_network", "true"], capture_output
 
 class Laboratory(unittest.TestCase):
     def test_the_page_runs_as_printed(self):
-        blocks = re.findall(r"^```bash\n(.*?)^```$", PAGE.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
+        blocks = re.findall(r"^```sh\n(.*?)^```$", PAGE.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
         self.assertGreater(len(blocks), 8)
         with tempfile.TemporaryDirectory() as name:
             folder = pathlib.Path(name)
@@ -36,18 +36,18 @@ class Laboratory(unittest.TestCase):
                 try:
                     code = shell.wait(timeout=PATIENCE_S)
                 except subprocess.TimeoutExpired:
-                    code = f"none within {PATIENCE_S} s: an arm that a fault has stopped is watched for ever"
+                    code = f"none within {PATIENCE_S} s: an arm that a fault has stopped is watched forever"
                 finally:
                     try:
                         os.killpg(shell.pid, signal.SIGKILL)  # what the page leaves running, or an interrupted test
                     except ProcessLookupError:
                         pass
-            told = {path.name: path.read_text(encoding="utf-8") for path in sorted(folder.glob("*.txt"))}
-            self.assertEqual(code, 0, "\n".join(f"-- {name}\n{text}" for name, text in told.items()))
-            self.assertIn("VENTED", told["valves.txt"])
-            self.assertIn("IDENTICAL", told["output.txt"])
+            printed = {path.name: path.read_text(encoding="utf-8") for path in sorted(folder.glob("*.txt"))}
+            self.assertEqual(code, 0, "\n".join(f"-- {name}\n{text}" for name, text in printed.items()))
+            self.assertIn("VENTED", printed["valves.txt"])
+            self.assertIn("IDENTICAL", printed["output.txt"])
             self.assertTrue((folder / "out/tracked/log.csv").exists())
-            print(told["output.txt"])
+            print(printed["output.txt"])
 
 
 if __name__ == "__main__":

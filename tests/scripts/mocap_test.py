@@ -11,7 +11,7 @@ import unittest
 
 from running_arm import PYTHON, ROOT, go_on_in_our_python, own_url, skip_without_multicast, start, tracks_within, write_config
 
-EXAMPLE = ROOT / "docs/examples/republish.py"
+EXAMPLE = ROOT / "examples/republish.py"
 
 skip_without_multicast()
 go_on_in_our_python()

@@ -10,7 +10,7 @@ LAW_COLOUR = {"(17)": CATEGORY[0], "statics and PI": CATEGORY[4], "PI alone": CA
 
 
 def _kept(rows, key="u_rms_rad"):
-    """Values in mrad; what left ACTIVE is no tracking."""
+    """Values in mrad; runs that left ACTIVE do not count."""
     return [1e3 * row[key] if row["stayed_active"] and row[key] is not None else np.nan for row in rows]
 
 
@@ -29,7 +29,7 @@ def _softness(axes, rows):
     axes.minorticks_off()
     axes.set_xlabel("$K_P$ [N m/rad]")
     axes.set_ylabel("tip stiffness [N/m]")
-    axes.set_title("how soft the tip is")
+    axes.set_title("stiffness of the tip")
     axes.legend(handles=[Line2D([], [], label="predicted", **THEORY_STYLE),
                          Line2D([], [], color=CATEGORY[0], marker="o", linestyle="", label="(17)"),
                          Line2D([], [], color=CATEGORY[1], marker="o", linestyle="", label="$K_P$ alone"),
@@ -74,7 +74,7 @@ def _tilt(axes, rows):
     axes.set_xlabel("tilt of the base [degrees]")
     axes.set_ylabel("tracking error [mrad rms]")
     axes.set_ylim(bottom=0)
-    axes.set_title("a base that is not where it is believed to be")
+    axes.set_title("a base that is tilted against the model")
     axes.legend()
 
 
@@ -102,10 +102,10 @@ def stability(results, path):
         axes.set_ylim(0, 1.15 * gains[-1])
         axes.set_xlabel(each["axis"].replace("[s]", "[ms]"))
         axes.set_ylabel("$K_P$ [N m/rad]")
-    handles = [Line2D([], [], color=CATEGORY[2], marker="o", linestyle="", markersize=5, label="a blow fades"),
+    handles = [Line2D([], [], color=CATEGORY[2], marker="o", linestyle="", markersize=5, label="a blow decays"),
                Line2D([], [], color=CATEGORY[1], marker="x", linestyle="", markersize=5, label="it does not"),
                Line2D([], [], color=CATEGORY[0], linewidth=1.6, label="limit, simulated"),
-               Line2D([], [], label="predicted, as softarm check does", **THEORY_STYLE)]
+               Line2D([], [], label="predicted, as by softarm check", **THEORY_STYLE)]
     finish(figure, path, "Stability", handles)
 
 
@@ -137,13 +137,13 @@ def control(results, path):
         below.set_xlim(left, 8 * below.get_xlim()[1])
         below.invert_yaxis()
         below.set_xlabel(unit)
-    finish(figure, path, "What a scene needs: control rate, terms of (17)", row_gap=0.7, left_margin=1.35, column_gap=1.5)
+    finish(figure, path, "Control rate and terms of (17)", row_gap=0.7, left_margin=1.35, column_gap=1.5)
 
 
 METHOD_STYLE = {"sdirk2": (CATEGORY[0], "o-"), "cash4": (CATEGORY[2], "s-"), "sdirk4": (CATEGORY[3], "^-"),
                 "erk": (CATEGORY[4], "v-"), "cvode_bdf": (CATEGORY[1], "o--")}
 DEFAULT_STYLE = {"color": CATEGORY[0], "marker": "D", "markersize": 6, "linestyle": ""}
-PLAIN_STYLE = {"color": INK, "marker": "*", "markersize": 9, "linestyle": ""}  # as most would set it up
+PLAIN_STYLE = {"color": INK, "marker": "*", "markersize": 9, "linestyle": ""}  # the usual set-up
 
 
 def plants(results, path):

@@ -42,11 +42,11 @@ def _source_handles(log):
 
 
 def _near(phi, phi_reference):
-    """phi on the turn that is closest to the reference; without one, unwrapped over its valid stretch."""
+    """phi on the turn that is closest to the reference; without one, unwrapped where it is valid."""
     known = np.zeros(0, dtype=int) if phi_reference is None else np.flatnonzero(np.isfinite(phi_reference))
     if not known.size:
         return _unwrapped(phi)
-    # Where the reference is straight or silent, its neighbours in time say which turn is meant.
+    # Where the reference is straight or absent, its neighbours in time determine the turn.
     filled = np.interp(np.arange(len(phi)), known, phi_reference[known])
     return filled + wrapped(phi - filled)
 
@@ -122,14 +122,14 @@ def curvature(log, directory):
     if error is not None:
         grid[0][1].set_title("reference minus " + ("arm" if _has_truth(log) else "estimate"))
     components = [Line2D([], [], color=COMPONENT[k], label=f"$u_{axis}$") for k, axis in enumerate("xy")]
-    told_by_colour = "arm" if _has_truth(log) else "estimate"
-    rest = [handle for handle in _source_handles(log) if handle.get_label() != told_by_colour]
+    shown_by_colour = "arm" if _has_truth(log) else "estimate"
+    rest = [handle for handle in _source_handles(log) if handle.get_label() != shown_by_colour]
     finish(figure, directory / "u.png", "Curvature coordinates" + _selection_note(log), components + rest + modes)
-    return "u.png", "Curvature coordinates u of every segment, and what is missing to the reference."
+    return "u.png", "Curvature coordinates u of every segment, and reference minus u."
 
 
 def _limit_to_active(axes, log, t, values):
-    """An error's axis shows what happens while tracking; the blend at the start may leave the picture."""
+    """The axis of an error fits the tracking; the blend at the start may exceed it."""
     rows = np.isin(np.arange(len(log.t_s)), np.flatnonzero(log.tracking_rows(1.0)))
     rows = rows[:: max(1, len(log.t_s) // len(t))][: len(t)]
     chosen = values[rows]
@@ -158,11 +158,11 @@ def velocities(log, directory):
 
 
 def recording(log, directory):
-    """u, its velocity and what does not fit, in one picture: for a log of which no truth is known."""
+    """u, its velocity and residuals in one picture: for a log without the true state."""
     if _has_truth(log) or log.velocity is None or log.twist_rad is None or log.segments > 1:
         return None
     panels = [("$u$ [rad]", log.u[:, 0]), (r"$\dot u$ [rad/s]", log.velocity[:, 0]),
-              ("twist [mrad]", 1e3 * log.twist_rad), ("chord error [mm]", 1e3 * log.length_m)]
+              ("torsion [mrad]", 1e3 * log.twist_rad), ("chord error [mm]", 1e3 * log.length_m)]
     figure, grid = _grid(len(panels), 1, row_height=1.4)
     for row, (label, values) in zip(grid, panels):
         t, values = thinned(log.t_s, values)
@@ -171,7 +171,7 @@ def recording(log, directory):
         row[0].set_ylabel(label)
     modes = time_axes(grid, log)
     components = [Line2D([], [], color=COMPONENT[k], label=f"${axis}$ component") for k, axis in enumerate("xy")]
-    finish(figure, directory / "recording.png", "What the estimator makes of the recording", components + modes)
+    finish(figure, directory / "recording.png", "Estimates from the recording", components + modes)
     return "recording.png", ("Curvature u and its velocity; rotation about the axis that a segment of constant curvature "
                              "does not have; measured minus expected chord.")
 
@@ -233,7 +233,7 @@ def tip_path(log, directory):
     above.scatter(*start[:2], color=CATEGORY[1], s=26, zorder=3)
     handles.append(Line2D([], [], color=CATEGORY[1], marker="o", linestyle="", markersize=5, label="start"))
     extent = np.ptp(points, axis=0)
-    extent = np.maximum(extent, 0.4 * extent.max() + 1e-6)  # one scale on all axes, and no flat box
+    extent = np.maximum(extent, 0.4 * extent.max() + 1e-6)  # one scale on all axes, no flat box
     middle = (points.max(axis=0) + points.min(axis=0)) / 2
     for axis, name in enumerate("xyz"):
         getattr(space, f"set_{name}lim")(middle[axis] - 0.55 * extent[axis], middle[axis] + 0.55 * extent[axis])
@@ -255,7 +255,7 @@ HISTOGRAM_TITLES = {"lateness_us": "wake-up after the deadline", "frame_age_us":
 
 
 def _finite_edges(edges, buckets):
-    """Edges for a logarithmic axis, one more than buckets: an open or zero end gets a place of its own."""
+    """Edges for a logarithmic axis, one more than buckets: an open or zero end gets a separate place."""
     edges = [np.nan if edge is None else float(edge) for edge in edges]
     if len(edges) == buckets:  # lower edges only
         edges.append(np.nan)
@@ -267,7 +267,7 @@ def _finite_edges(edges, buckets):
 
 
 def _quantile(edges, counts, q):
-    """Upper edge of the bucket that holds the quantile: what a histogram can promise."""
+    """Upper edge of the bucket that holds the quantile, an upper bound of it."""
     return edges[1:][np.searchsorted(np.cumsum(counts), q * np.sum(counts))]
 
 
@@ -310,16 +310,16 @@ def tick_times(log, directory):
         largest = f", largest {_duration(known['max'])}" if "max" in known else ""
         axes.set_title(HISTOGRAM_TITLES.get(name, name) + largest)
         axes.set_ylim(top=axes.get_ylim()[1] * 3)
-    finish(figure, directory / "tick_times.png", "Where a tick's time goes", row_gap=0.8)
+    finish(figure, directory / "tick_times.png", "Timing of a tick", row_gap=0.8)
     return "tick_times.png", "Histograms since start; both axes are logarithmic."
 
 
 def residuals(log, directory):
-    """What does not fit a constant-curvature segment, the age of frames, and the modes."""
+    """Residuals of the constant-curvature segment, the age of frames, and the modes."""
     age_s, saturated = log.column("frame_age_s"), log.column("saturated")
     panels = []
     if log.twist_rad is not None:
-        panels.append(("twist [mrad]", 1e3 * log.twist_rad))
+        panels.append(("torsion [mrad]", 1e3 * log.twist_rad))
     if log.length_m is not None:
         panels.append(("chord error [mm]", 1e3 * log.length_m))
     if age_s is not None:

@@ -1,4 +1,4 @@
-"""report.html: the numbers of a run in tables and its figures, in one file that can be sent as it is."""
+"""report.html: the numbers of a run in tables and its figures, in one self-contained file."""
 import base64
 import html
 
@@ -39,24 +39,24 @@ def tracking_table(log, from_s):
     tracking = log.tracking(from_s)
     if tracking is None:
         return None
-    # summary.json was computed by the run itself; the log has the same numbers and the ones per segment in u.
-    told = log.summary.get("tracking", {})
+    # The run itself computed summary.json; the log has the same numbers, and u by segment.
+    known = log.summary.get("tracking", {})
     rows = []
     for i, (u_rms, u_max, theta_rms, phi_rms) in enumerate(tracking):
-        theta_told, phi_told = told.get("theta_rms_rad", []), told.get("phi_rms_rad", [])
-        theta = theta_told[i] if i < len(theta_told) and theta_told[i] is not None else theta_rms
-        phi = phi_told[i] if i < len(phi_told) and phi_told[i] is not None else phi_rms
+        known_theta, known_phi = known.get("theta_rms_rad", []), known.get("phi_rms_rad", [])
+        theta = known_theta[i] if i < len(known_theta) and known_theta[i] is not None else theta_rms
+        phi = known_phi[i] if i < len(known_phi) and known_phi[i] is not None else phi_rms
         rows.append([f"segment {i + 1}"] + [_fixed(1e3 * v, 2) for v in (theta, phi, u_rms, u_max)])
-    u_rms, u_max = told.get("u_rms_rad"), told.get("u_max_rad")  # null where the truth is not known: a recording
+    u_rms, u_max = known.get("u_rms_rad"), known.get("u_max_rad")  # null where the truth is not known: a recording
     u_rms = np.sqrt(np.nanmean(tracking[:, 0] ** 2)) if u_rms is None else u_rms
     u_max = np.nanmax(tracking[:, 1]) if u_max is None else u_max
     rows.append(["all", "", "", _fixed(1e3 * u_rms, 2), _fixed(1e3 * u_max, 2)])
-    if told.get("tip_rms_m") is not None:
-        largest = told.get("tip_max_m")
-        rows.append(["tip [mm]", "", "", _fixed(1e3 * told["tip_rms_m"], 2),
+    if known.get("tip_rms_m") is not None:
+        largest = known.get("tip_max_m")
+        rows.append(["tip [mm]", "", "", _fixed(1e3 * known["tip_rms_m"], 2),
                      "" if largest is None else _fixed(1e3 * largest, 2)])
-    if told.get("tip_near_after_s") is not None:
-        rows.append(["tip within 10 mm after [s]", "", "", _fixed(told["tip_near_after_s"], 2), ""])
+    if known.get("tip_near_after_s") is not None:
+        rows.append(["tip within 10 mm after [s]", "", "", _fixed(known["tip_near_after_s"], 2), ""])
     return ["tracking error [mrad]", "θ rms", "φ rms", "u rms", "u max"], rows
 
 
@@ -98,13 +98,13 @@ def _flat(prefix, value):
 
 
 def summary_table(log):
-    """Everything summary.json says, key by key."""
+    """All of summary.json, key by key."""
     rows = [[key, value] for key, value in _flat("", log.summary)]
     return (["summary", ""], rows) if rows else None
 
 
 def mode_table(log, longest=12):
-    """Head and rows of the stretches of each mode, in order."""
+    """Head and rows of the periods of each mode, in order."""
     spans = log.mode_spans()
     rows = [[mode or "–", reason, _fixed(start, 3), _fixed(end - start, 3)] for mode, reason, start, end in spans[:longest]]
     if len(spans) > longest:

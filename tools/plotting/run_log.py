@@ -1,4 +1,4 @@
-"""One run as its files tell it: log.csv (columns by name, empty cells are NaN), summary.json and timing.json."""
+"""One run, read from its files: log.csv (columns by name, empty cells are NaN), summary.json and timing.json."""
 import csv
 import json
 import pathlib
@@ -6,7 +6,7 @@ import re
 
 import numpy as np
 
-THETA_FOR_PHI_RAD = 0.05  # below it the bending plane, and with it phi, says nothing
+THETA_FOR_PHI_RAD = 0.05  # below it the bending plane, and phi with it, is undefined
 
 
 def wrapped(angle_rad):
@@ -58,7 +58,7 @@ class RunLog:
         self.tip_reference_m = self._point("tipref_{}_m")
 
     def column(self, name):
-        """The column as numbers, or None where there is no such column or nothing in it."""
+        """The column as numbers, or None where it is absent or empty."""
         if name not in self._cache:
             values = None
             if name in self._text:
@@ -91,7 +91,7 @@ class RunLog:
 
     @property
     def best_u(self):
-        """What the arm did: its true u where the log knows it, else the estimate."""
+        """u of the arm: the true one where the log has it, else the estimate."""
         return self.u if self.true_u is None else self.true_u
 
     def error(self):
@@ -105,7 +105,7 @@ class RunLog:
         return theta, phi
 
     def mode_spans(self):
-        """(mode, reason, start_s, end_s) of every stretch of one mode."""
+        """(mode, reason, start_s, end_s) of every period of one mode."""
         changes = np.flatnonzero(self.mode[1:] != self.mode[:-1]) + 1
         starts = np.concatenate(([0], changes))
         ends = np.concatenate((changes, [len(self.t_s) - 1]))

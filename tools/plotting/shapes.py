@@ -1,4 +1,4 @@
-"""What the simulated arm's whole shape tells: the paper's figures 4 to 7, for arms of links or pieces and paths of the tip."""
+"""Figures of the simulated arm's whole shape: the paper's figures 4 to 7, for arms of links or pieces and paths of the tip."""
 import numpy as np
 from matplotlib.lines import Line2D
 
@@ -69,8 +69,8 @@ def _posture(log, directory, which, name, number):
                Line2D([], [], label=share, **PART_STYLE)]
     finish(figure, directory / name, ("Bending angle" if which == 0 else "Direction of bending") + " of links and fit",
            handles + modes)
-    told = "bending angle, times their number in a segment," if which == 0 else "direction of bending, where they bend,"
-    return name, (f"The {told} of all links of every segment; of the constant-curvature segment that fits the "
+    what = "bending angle, times their number in a segment," if which == 0 else "direction of bending, where they bend,"
+    return name, (f"The {what} of all links of every segment; of the constant-curvature segment that fits the "
                   f"segment's end; and the reference's (the paper's figure {number}).")
 
 
@@ -96,7 +96,7 @@ def _plane_axes(path):
 
 
 def figure6(log, directory):
-    """The tip's path against the one asked for, and its error over time: the paper's figure 6."""
+    """The tip's path against its reference, and its error over time: the paper's figure 6."""
     if not _follows_tip_path(log):
         return None
     t, tip, wanted = thinned(log.t_s, log.tip_m, log.tip_reference_m)

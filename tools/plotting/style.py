@@ -1,4 +1,4 @@
-"""How our plots look: one set of colours, fonts and helpers for every figure."""
+"""Appearance of our plots: one set of colours, fonts and helpers for every figure."""
 import matplotlib
 
 matplotlib.use("Agg")

@@ -5,6 +5,8 @@
 #include <cstdint>
 #include <span>
 
+#include "softarm/base/time.hpp"
+
 namespace softarm {
 
 /// What the valve side makes of a command.
@@ -33,12 +35,11 @@ struct PressureCommand {
 class CommandExpiry {
  public:
   static constexpr std::int64_t kNoSequence = -1;  ///< `sequence()` while vented
-  static constexpr std::int64_t kNever = INT64_MAX;
 
   /// @param chambers number of set points in a command, >= 0 (std::invalid_argument otherwise).
   /// @param longest_ns what is valid for longer is so for this long only: a sender that mistakes a
   /// unit must not hold the valves for minutes.
-  explicit CommandExpiry(int chambers, std::int64_t longest_ns = kNever);
+  explicit CommandExpiry(int chambers, std::int64_t longest_ns = kForever);
 
   /// Takes a command that arrived at `arrival_ns` (times never go back).
   CommandVerdict receive(const PressureCommand& command, std::int64_t arrival_ns) noexcept;
@@ -47,8 +48,8 @@ class CommandExpiry {
   /// the valves just now.
   bool update(std::int64_t now_ns) noexcept;
 
-  bool vented() const noexcept { return expires_ns_ == kNever; }    ///< no command is in force
-  std::int64_t expires_ns() const noexcept { return expires_ns_; }  ///< kNever while vented
+  bool vented() const noexcept { return expires_ns_ == kForever; }  ///< no command is in force
+  std::int64_t expires_ns() const noexcept { return expires_ns_; }  ///< kForever while vented
   std::int64_t sequence() const noexcept { return sequence_; }      ///< of the command in force
   const Eigen::VectorXd& set_points_bar() const noexcept {
     return set_points_bar_;
@@ -56,7 +57,7 @@ class CommandExpiry {
 
  private:
   std::int64_t longest_ns_;
-  std::int64_t expires_ns_ = kNever;
+  std::int64_t expires_ns_ = kForever;
   std::int64_t sequence_ = kNoSequence;
   Eigen::VectorXd set_points_bar_;
 };

@@ -1,4 +1,5 @@
 // What an experiment says about the chambers of each segment and the limits of their valves.
+// config/template.yaml documents every setting.
 #pragma once
 
 #include <cstddef>
@@ -12,6 +13,8 @@ namespace softarm {
 struct Chamber {
   double angle_rad = 0.0;
   double gain_nm_per_bar = 0.839;
+
+  bool operator==(const Chamber&) const = default;
 };
 
 /// What a command is made of.
@@ -29,10 +32,10 @@ struct ActuationSettings {
       segments;  ///< chambers of each segment, in the order of the valves
   double min_pressure_bar = 0.0;
   double max_pressure_bar = 2.0;
-  double bias_pressure_bar = 0.0;   ///< where pressures rest that no torque asks to move
-  double slew_bar_per_s = 40.0;     ///< largest rate of a commanded pressure
-  double vent_bar_per_s = 8.0;      ///< rate of the ramp to zero when venting
-  std::optional<double> plane_rad;  ///< a planar arm bends only in the plane at this phi
+  double bias_pressure_bar = 0.0;
+  double slew_bar_per_s = 40.0;
+  double vent_bar_per_s = 8.0;
+  std::optional<double> plane_rad;
 };
 
 /// Number of chambers, or moments, of the whole arm.

@@ -1,5 +1,7 @@
-// The machine's monotonic clock, and deadlines on it.
+// The machine's clocks, and deadlines on the monotonic one.
 #pragma once
+
+#include <time.h>
 
 #include <cstdint>
 
@@ -7,9 +9,24 @@ namespace softarm {
 
 /// CLOCK_MONOTONIC in ns.
 std::int64_t monotonic_now_ns() noexcept;
+/// CLOCK_REALTIME (the date) in ns: comparable with other machines' clocks, but it may jump.
+std::int64_t wall_now_ns() noexcept;
+/// Processor time of this thread in ns.
+std::int64_t thread_cpu_ns() noexcept;
+
+/// The monotonic and the wall clock (CLOCK_REALTIME) at one instant, in ns.
+struct ClockPair {
+  std::int64_t monotonic_ns, wall_ns;
+};
+
+/// Reads both together: of a few attempts the one that was held up least between the readings.
+ClockPair read_clocks() noexcept;
 
 /// Sleeps until an absolute time of CLOCK_MONOTONIC; returns early when a signal arrives.
 void sleep_until_ns(std::int64_t deadline_ns) noexcept;
+
+/// What is left until a time of CLOCK_MONOTONIC, not below zero: for ppoll.
+timespec time_left(std::int64_t deadline_ns) noexcept;
 
 /// Absolute deadlines at a fixed period. Missed ones are skipped, never caught up with.
 class PeriodicDeadline {

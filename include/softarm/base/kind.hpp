@@ -12,8 +12,18 @@
 
 namespace softarm {
 
+class Keys;
+
+/// A kind that a configuration may say more of than its name: `describe` declares the keys of its
+/// settings (base/keys.hpp).
+template <class Value>
+concept HasKeys = requires(Value& value, Keys& key) {
+  value.describe(key);
+};
+
 /// A value of one of several types, known by what `Interface` asks of them. Copies share it: it
-/// does not change. `Interface` has a virtual destructor and `const char* name() const noexcept`.
+/// does not change. `Interface` has a virtual destructor, `const char* name() const noexcept` and
+/// `std::shared_ptr<const Interface> described(Keys&) const`, a copy with what was read.
 template <class Interface>
 class NamedKind {
  public:
@@ -27,11 +37,21 @@ class NamedKind {
     return holder != nullptr ? &holder->value : nullptr;
   }
 
+  /// Declares the keys of its settings, if it has any.
+  void describe(Keys& key) { model_ = model_->described(key); }
+
  protected:
+  /// To derive from, with the rest of `Interface`.
   template <class Value>
   struct Holder : Interface {
     explicit Holder(Value it) : value(std::move(it)) {}
     const char* name() const noexcept override { return value.name(); }
+    template <class Model>
+    std::shared_ptr<const Interface> described_as(Keys& key) const {
+      Value copy = value;
+      if constexpr (HasKeys<Value>) copy.describe(key);
+      return std::make_shared<Model>(std::move(copy));
+    }
     Value value;
   };
 
@@ -57,6 +77,18 @@ class Registry {
   }
 
   const std::vector<T>& all() const noexcept { return all_; }
+  std::vector<const char*> names() const {
+    std::vector<const char*> names;
+    for (const T& kind : all_) names.push_back(kind.name());
+    return names;
+  }
+  /// Place of a name in `all`. @throw std::invalid_argument if there is none
+  std::size_t index(std::string_view name) const {
+    const T* kind = find(name);
+    if (kind == nullptr)
+      throw std::invalid_argument("no kind of the name " + std::string(name) + " was added");
+    return static_cast<std::size_t>(kind - all_.data());
+  }
   /// nullptr if there is none of this name.
   const T* find(std::string_view name) const noexcept {
     for (const T& kind : all_)

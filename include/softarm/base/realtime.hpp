@@ -8,7 +8,7 @@ namespace softarm {
 
 /// Scheduling of the thread that calls apply_realtime_settings.
 struct RealtimeSettings {
-  bool fifo = false;  ///< SCHED_FIFO for the tick
+  bool fifo = false;
   int priority = 50;
   int cpu = -1;  ///< pin the tick's thread; -1: do not
   bool lock_memory = false;

@@ -6,6 +6,8 @@
 #include <string>
 #include <string_view>
 
+#include "softarm/base/time.hpp"
+
 namespace softarm {
 
 /// What a loop says of itself after each of its rounds.
@@ -49,7 +51,7 @@ class ServiceNotifier {
   // What the manager knows.
   bool ready_ = false, stopping_ = false;
   std::string_view state_, reason_;
-  std::int64_t alive_ns_ = 0;
+  std::int64_t alive_ns_ = kNever;
 };
 
 }  // namespace softarm

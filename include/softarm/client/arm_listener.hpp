@@ -9,6 +9,7 @@
 #include <softarm_messages/pressure_measurement_t.hpp>
 #include <string>
 
+#include "softarm/base/time.hpp"
 #include "softarm/client/observation.hpp"
 #include "softarm/config/experiment.hpp"
 #include "softarm/estimation/curvature_estimator.hpp"
@@ -54,10 +55,7 @@ class ArmListener {
   /// "ACTIVE (none)", or "not heard".
   std::string daemon_text() const;
 
-  static constexpr std::int64_t kNever = INT64_MIN;
-
  private:
-  std::int64_t arrival_ns(const ReceivedMessage& packet) const;
   void take_packet(std::size_t channel, const ReceivedMessage& packet);
   void take_frame(std::int64_t arrival_ns);
   void note_ids(std::span<const std::byte> bytes);

@@ -1,4 +1,5 @@
-// One experiment: everything a YAML file decides, composed of the settings that each room declares.
+// One experiment: everything a YAML file decides, composed of the settings that each module declares.
+// config/template.yaml documents every setting.
 #pragma once
 
 #include <cstdint>
@@ -15,9 +16,9 @@ namespace softarm {
 
 /// Defaults of a simulated run.
 struct RunSettings {
-  double duration_s = 20.0;      ///< default of `softarm run` and tools/demo
-  double tracking_from_s = 1.0;  ///< after ACTIVE; tracking errors count from here on
-  double log_rate_hz = 0.0;      ///< rows of log.csv, from which errors are taken; 0: every tick
+  double duration_s = 20.0;
+  double tracking_from_s = 1.0;
+  double log_rate_hz = 0.0;
 };
 
 /// An experiment as its file says it, defaults filled in.

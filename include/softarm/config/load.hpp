@@ -24,6 +24,11 @@ std::string resolved_text(const Experiment& experiment);
 /// (config/template.yaml).
 std::string template_text();
 
+/// The JSON Schema (draft 7) by which editors complete and check an experiment
+/// (config/experiment.schema.json). It accepts what load_experiment accepts, and more: what depends
+/// on several keys, or on a file that includes this one, is not checked.
+std::string schema_text();
+
 /// What is allowed but probably not meant, as sentences for a person: gains that the declared delay
 /// does not allow, motion capture too slow for the safety thresholds. Empty if all is well.
 std::vector<std::string> experiment_warnings(const Experiment& experiment);

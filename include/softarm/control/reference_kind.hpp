@@ -4,6 +4,7 @@
 //   struct Spiral {
 //     double rate_radps = 1.0;
 //     const char* name() const noexcept { return "spiral"; }
+//     void describe(Keys& key) { key("rate_radps", rate_radps, from(0, 10), "of phi"); }
 //     void check(const std::string& where, int segments) const;  // throws std::invalid_argument
 //     double largest_theta_rad() const noexcept;
 //     double largest_speed_radps() const noexcept;
@@ -77,6 +78,7 @@ class ReferenceInterface {
  public:
   virtual ~ReferenceInterface() = default;
   virtual const char* name() const noexcept = 0;
+  virtual std::shared_ptr<const ReferenceInterface> described(Keys& key) const = 0;
   virtual void check(const std::string& where, int segments) const = 0;
   virtual double largest_theta_rad() const noexcept = 0;
   virtual double largest_speed_radps() const noexcept = 0;
@@ -112,6 +114,9 @@ class ReferenceKind : public NamedKind<ReferenceInterface> {
     using Holder<K>::Holder;
     using Holder<K>::value;
 
+    std::shared_ptr<const ReferenceInterface> described(Keys& key) const override {
+      return this->template described_as<Model>(key);
+    }
     void check(const std::string& where, int segments) const override {
       value.check(where, segments);
     }

@@ -1,4 +1,5 @@
 // The kinds of reference that are built in.
+// config/template.yaml documents every setting.
 #pragma once
 
 #include <Eigen/Core>
@@ -6,15 +7,20 @@
 #include <string>
 #include <vector>
 
+#include "softarm/base/keys.hpp"
 #include "softarm/control/reference_kind.hpp"
 
 namespace softarm {
+
+/// Declares the keys of a curvature of every segment, `theta_rad` and `phi_rad` or `u_rad` (2n).
+void describe_pose(Keys& key, std::vector<double>& u_rad, Presence presence);
 
 /// Hold u constant.
 struct SetPointReference {
   std::vector<double> u_rad;  ///< 2n
 
   const char* name() const noexcept { return "set_point"; }
+  void describe(Keys& key);
   void check(const std::string& where, int segments) const;
   double largest_theta_rad() const noexcept;
   double largest_speed_radps() const noexcept { return 0.0; }
@@ -29,9 +35,10 @@ struct PaperReference {
   double phi_centre_rad = std::numbers::pi;
   double phi_amplitude_rad = 1.0;
   double rate_radps = 2.0;
-  double phase_step_rad = 1.0471975511965976;  ///< pi/3 from segment to segment
+  double phase_step_rad = 1.0471975511965976;
 
   const char* name() const noexcept { return "paper"; }
+  void describe(Keys& key);
   void check(const std::string& where, int segments) const;
   double largest_theta_rad() const noexcept { return theta_rad; }
   double largest_speed_radps() const noexcept;
@@ -49,6 +56,7 @@ struct WayPointReference {
   bool repeat = false;
 
   const char* name() const noexcept { return "way_points"; }
+  void describe(Keys& key);
   void check(const std::string& where, int segments) const;
   double largest_theta_rad() const noexcept;
   double largest_speed_radps() const noexcept;
@@ -57,9 +65,10 @@ struct WayPointReference {
 
 /// References received over LCM; until one arrives, the arm holds where it is.
 struct LiveReference {
-  double timeout_s = 0.2;  ///< silence after which the last received u is held at rest
+  double timeout_s = 0.2;
 
   const char* name() const noexcept { return "live"; }
+  void describe(Keys& key);
   void check(const std::string& where, int segments) const;
 };
 
@@ -79,6 +88,7 @@ struct TipPathReference {
   double rate_radps = 0.6283185307179586;
 
   const char* name() const noexcept;
+  void describe(Keys& key);
   void check(const std::string& where, int segments) const;
   TipReference tip(double time_s) const noexcept;
   /// How far the path goes from a point, at 720 instants of its period.

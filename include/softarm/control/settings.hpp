@@ -1,5 +1,6 @@
 // What an experiment may choose about control: the law, its gains, its terms and the reference it
 // follows.
+// config/template.yaml documents every setting.
 #pragma once
 
 #include <vector>
@@ -17,19 +18,18 @@ enum class ControlCoordinates {
 
 /// The terms of (17) that are evaluated; one that is left out costs nothing.
 struct ControlTerms {
-  bool inertia = true;    ///< B u''_ref
-  bool coriolis = true;   ///< C(u, u') u'_ref
-  bool gravity = true;    ///< G
-  bool stiffness = true;  ///< K u_ref
-  bool damping = true;    ///< D u'_ref
+  bool inertia = true;
+  bool coriolis = true;
+  bool gravity = true;
+  bool stiffness = true;
+  bool damping = true;
 };
 
 /// How a path of the tip becomes a motion of the segments: (21) as corrected, second order.
 struct TaskSpaceSettings {
-  double lambda_1ps = 6.0;  ///< the tip's error law has both poles at -lambda: Lambda_p = lambda^2,
-                            ///< Lambda_d = 2 lambda
-  double tip_bandwidth_radps = 10.0;  ///< of the filter on what the tip is off the reference's own
-  double posture_rate_1ps = 2.0;      ///< null space of J: u decays at this rate, towards less bend
+  double lambda_1ps = 6.0;
+  double tip_bandwidth_radps = 10.0;
+  double posture_rate_1ps = 2.0;
 };
 
 /// The controller (17): its terms, gains and limits.
@@ -43,16 +43,14 @@ struct ControllerSettings {
   /// Diagonal of an integral gain on u_ref - u (N m/(rad s)), in u whatever the coordinates; not in
   /// the paper. Empty or zero: none, at no cost.
   std::vector<double> ki;
-  double valve_lag_s =
-      0.0;  ///< first-order lag inverted on the part of (17) that depends on the reference alone
-  double delay_s = 0.0;  ///< dead time of valves and tubes, for the load-time gain check alone
-  double max_theta_rad = 2.5;     ///< soft limit on the reference's and the arm's theta
-  double max_speed_radps = 20.0;  ///< soft limit on the reference's |u'| a segment
-  double max_step_rad = 0.2;      ///< a larger jump of a live reference is refused
-  double blend_s = 1.0;           ///< time in which a reference is joined from wherever the arm is
-  double polar_theta_min_rad =
-      0.05;                      ///< bounds A^-1 and the phi error near theta = 0 in polar mode
-  TaskSpaceSettings task_space;  ///< for references of the tip
+  double valve_lag_s = 0.0;
+  double delay_s = 0.0;
+  double max_theta_rad = 2.5;
+  double max_speed_radps = 20.0;
+  double max_step_rad = 0.2;
+  double blend_s = 1.0;
+  double polar_theta_min_rad = 0.05;
+  TaskSpaceSettings task_space;
 };
 
 /// One phase of a sequence; the last one lasts for ever.

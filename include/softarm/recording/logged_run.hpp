@@ -11,13 +11,15 @@
 #include "softarm/config/experiment.hpp"
 #include "softarm/runtime/control_pipeline.hpp"
 #include "softarm/runtime/log_row.hpp"
+#include "softarm/simulation/simulated_operator.hpp"
 #include "softarm/transport/event_log.hpp"
 #include "softarm/transport/mocap_source.hpp"
 
 namespace softarm {
 
 /// Ticks at whole control periods from the log's first motion-capture frame on; frames arrive when
-/// the log says they did. Commands are computed and go nowhere. Reads the log as it goes: memory
+/// the log says they did. Commands are computed and go nowhere: no valve has to publish pressures,
+/// and nobody has to arm or to hold a button (SimulatedOperator). Reads the log as it goes: memory
 /// does not grow with its length.
 class LoggedRun {
  public:
@@ -41,6 +43,7 @@ class LoggedRun {
 
   Experiment experiment_;
   ControlPipeline pipeline_;
+  SimulatedOperator operator_;
   MocapSource mocap_;
   std::ifstream file_;
   EventLogReader log_;

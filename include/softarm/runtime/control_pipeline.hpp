@@ -12,6 +12,7 @@
 
 #include "softarm/actuation/pressure_allocator.hpp"
 #include "softarm/actuation/pressure_ramps.hpp"
+#include "softarm/base/time.hpp"
 #include "softarm/control/curvature_controller.hpp"
 #include "softarm/control/reference.hpp"
 #include "softarm/estimation/curvature_filter.hpp"
@@ -39,11 +40,11 @@ struct TickInput {
   bool command_expired = false;  ///< so long ago was one sent that the valves have vented meanwhile
   int consecutive_overruns = 0;  ///< ticks missed in a row; zero where they are not to be judged
   /// Arrival of the newest pressure measurement, where the valves publish them.
-  std::int64_t newest_measurement_ns = SafetyInput::kNever;
+  std::int64_t newest_measurement_ns = kNever;
   /// The measured pressures (bar, one a chamber), if some came since the last tick.
   const PressureVector* measured_bar = nullptr;
   /// Arrival of the newest "go", where there is a dead-man input.
-  std::int64_t newest_go_ns = SafetyInput::kNever;
+  std::int64_t newest_go_ns = kNever;
 };
 
 /// What the tick saw, decided and commands.
@@ -97,9 +98,7 @@ class ControlPipeline {
   void limit(Mode mode) noexcept;
   bool poses_frozen() const noexcept;
   bool beyond_soft_limit(bool speed_too) const noexcept;
-  double seconds(std::int64_t time_ns) const noexcept {
-    return 1e-9 * static_cast<double>(time_ns - epoch_ns_);
-  }
+  double seconds(std::int64_t time_ns) const noexcept { return to_seconds(time_ns - epoch_ns_); }
 
   PipelineSettings settings_;
   std::int64_t period_ns_;
@@ -125,7 +124,7 @@ class ControlPipeline {
   std::array<std::int64_t, kMaxSegments> seen_ns_{};
   std::int64_t epoch_ns_ = 0;
   std::int64_t previous_ns_ = 0;
-  std::int64_t newest_capture_ns_ = 0;
+  std::int64_t newest_capture_ns_ = kNever;
   std::int64_t late_frames_ = 0;
   std::uint32_t activations_ = 0;
   bool ticked_ = false;

@@ -73,7 +73,7 @@ class CurvatureWatch {
   std::int64_t settling_ns_;
   ArmParameters arm_;
   DynamicsWorkspace workspace_;
-  SegmentVector at_rest_, force_, actuated_;
+  SegmentVector force_, actuated_;
   std::int64_t since_ns_ = 0;
   bool beyond_ = false;
   bool strays_ = false;

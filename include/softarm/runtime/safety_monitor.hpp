@@ -6,6 +6,7 @@
 #include <limits>
 #include <span>
 
+#include "softarm/base/time.hpp"
 #include "softarm/runtime/settings.hpp"
 
 namespace softarm {
@@ -80,8 +81,6 @@ SafetyThresholds resolve_thresholds(const SafetySettings& settings,
 
 /// What the monitor is told in one tick. Times are of one monotonic clock, in ns.
 struct SafetyInput {
-  static constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::min();
-
   std::int64_t now_ns = 0;
   std::int64_t newest_capture_ns = kNever;  ///< of the segment seen longest ago
   bool motion_unknown = false;              ///< u of some segment is not known at this tick
@@ -137,8 +136,8 @@ class SafetyMonitor {
   bool armed_;
   int good_in_a_row_ = 0;
   std::int64_t previous_tick_ns_ = 0;
-  std::int64_t listening_since_ns_ = SafetyInput::kNever;  ///< end of the last stop, for the valves
-  std::int64_t deaf_until_ns_ = SafetyInput::kNever;       ///< to `arm` and frames, after a stop
+  std::int64_t listening_since_ns_ = kNever;  ///< end of the last stop, for the valves
+  std::int64_t deaf_until_ns_ = kNever;       ///< to `arm` and frames, after a stop
 };
 
 }  // namespace softarm

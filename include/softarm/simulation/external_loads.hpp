@@ -22,7 +22,7 @@ struct ExternalLoad {
   Eigen::Vector3d moment_nm = Eigen::Vector3d::Zero();
   LoadShape shape = LoadShape::constant;
   double start_s = 0.0;
-  double duration_s = 0.0;  ///< 0: for ever (a constant load only)
+  double duration_s = 0.0;
 };
 
 /// A base that is carried to and fro, without turning: base_position + amplitude sin(2 pi frequency

@@ -10,10 +10,12 @@
 #include "softarm/runtime/log_row.hpp"
 #include "softarm/runtime/settings.hpp"
 #include "softarm/simulation/simulated_arm.hpp"
+#include "softarm/simulation/simulated_operator.hpp"
 
 namespace softarm {
 
 /// Ticks at whole control periods; captures, arrivals and expiries at their own times between them.
+/// Where arming is explicit the arm is armed once, at the start: see SimulatedOperator.
 class LockStep {
  public:
   /// @throws as ControlPipeline and SimulatedArm
@@ -37,8 +39,8 @@ class LockStep {
   std::int64_t validity_ns_;
   ControlPipeline pipeline_;
   SimulatedArm arm_;
+  SimulatedOperator operator_;
   std::vector<MocapFrame> frames_;
-  std::vector<double> pressures_;
   PressureVector measured_;
   std::int64_t ticks_ = 0;
   DurationHistogram tick_times_;

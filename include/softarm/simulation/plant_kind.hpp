@@ -5,6 +5,7 @@
 //   struct Rope {
 //     int knots = 10;
 //     const char* name() const noexcept { return "rope"; }
+//     void describe(Keys& key) { key("knots", knots, from(1, 100), "of the whole rope"); }
 //     std::unique_ptr<PlantSystem> make(const PlantSettings& settings) const {
 //       return std::make_unique<RopeSystem>(settings, knots);
 //     }
@@ -31,6 +32,8 @@ class PlantInterface {
  public:
   virtual ~PlantInterface() = default;
   virtual const char* name() const noexcept = 0;
+  virtual bool has_keys() const noexcept = 0;
+  virtual std::shared_ptr<const PlantInterface> described(Keys& key) const = 0;
   virtual std::unique_ptr<PlantSystem> make(const PlantSettings& settings) const = 0;
 };
 
@@ -42,6 +45,8 @@ class PlantKind : public NamedKind<PlantInterface> {
   template <AnyPlant K>
   PlantKind(K kind) : NamedKind(std::make_shared<Model<K>>(std::move(kind))) {}
 
+  /// Whether a configuration has a section `plant.NAME` for it.
+  bool has_keys() const noexcept { return model().has_keys(); }
   /// The mechanics of the arm that `settings` describe, whose `kind` is this one.
   std::unique_ptr<PlantSystem> make(const PlantSettings& settings) const {
     return model().make(settings);
@@ -51,6 +56,10 @@ class PlantKind : public NamedKind<PlantInterface> {
   template <class K>
   struct Model final : Holder<K> {
     using Holder<K>::Holder;
+    bool has_keys() const noexcept override { return HasKeys<K>; }
+    std::shared_ptr<const PlantInterface> described(Keys& key) const override {
+      return this->template described_as<Model>(key);
+    }
     std::unique_ptr<PlantSystem> make(const PlantSettings& settings) const override {
       return this->value.make(settings);
     }

@@ -1,4 +1,5 @@
 // The kinds of simulated arm that are built in.
+// config/template.yaml documents every setting.
 #pragma once
 
 #include <memory>
@@ -26,6 +27,7 @@ struct RefinedSettings {
   std::vector<double> rigidity_weights = {};
 
   const char* name() const noexcept { return "refined"; }
+  void describe(Keys& key);
   std::unique_ptr<PlantSystem> make(const PlantSettings& settings) const;
 };
 
@@ -44,6 +46,7 @@ struct LinkSettings {
   std::optional<double> joint_damping_nms_per_rad = {};
 
   const char* name() const noexcept { return "links"; }
+  void describe(Keys& key);
   std::unique_ptr<PlantSystem> make(const PlantSettings& settings) const;
 };
 

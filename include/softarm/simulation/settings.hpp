@@ -1,4 +1,5 @@
 // What an experiment says about the simulated arm: its parameters, valves, sensing and integrator.
+// config/template.yaml documents every setting.
 #pragma once
 
 #include <cstdint>
@@ -14,23 +15,22 @@ namespace softarm {
 /// First-order valves between a commanded and a real pressure. Left out (lag 0): the command is the
 /// pressure. With actuation by torque, read N m for bar.
 struct ValveSettings {
-  double lag_s = 0.0;                ///< time constant
-  double supply_pressure_bar = 2.0;  ///< no pressure above it
-  double dead_time_s = 0.0;     ///< from the arrival of a command until the valves begin to act
-  double slew_bar_per_s = 0.0;  ///< largest rate of a real pressure; 0: as fast as the lag lets it
-  double resolution_bar = 0.0;  ///< of the set points: rounded to whole multiples; 0: exact
+  double lag_s = 0.0;
+  double supply_pressure_bar = 2.0;
+  double dead_time_s = 0.0;
+  double slew_bar_per_s = 0.0;
+  double resolution_bar = 0.0;
 };
 
 /// Simulated motion capture.
 struct MocapSettings {
   double rate_hz = 200.0;
-  double latency_s = 0.0;         ///< from capture to arrival of the message
-  double position_noise_m = 0.0;  ///< standard deviation an axis of every body
-  double orientation_noise_rad =
-      0.0;  ///< standard deviation of the rotation vector an axis of every body
-  double position_resolution_m = 0.0;  ///< positions are rounded to whole multiples; 0: exact
-  double dropout_probability = 0.0;    ///< of a whole frame, independent from frame to frame
-  bool noise_on_base = true;           ///< the base is a measured body too, unless it is fixed
+  double latency_s = 0.0;
+  double position_noise_m = 0.0;
+  double orientation_noise_rad = 0.0;
+  double position_resolution_m = 0.0;
+  double dropout_probability = 0.0;
+  bool noise_on_base = true;
 };
 
 /// Which method of SUNDIALS integrates; docs/results/plant_methods.md has what each costs. The
@@ -66,8 +66,7 @@ struct PlantSettings {
   MocapSettings mocap;
   /// At rest. Where a segment has several parts, each takes its share, as under a uniform moment.
   SegmentVector initial_u_rad;
-  Eigen::Vector3d tip_force_n =
-      Eigen::Vector3d::Zero();  ///< constant external force at the tip, world frame
+  Eigen::Vector3d tip_force_n = Eigen::Vector3d::Zero();
   std::vector<ExternalLoad> loads;
   std::vector<double> payload_kg;  ///< point masses on the segments' ends; empty: none, else n
   BaseMotion base_motion;
@@ -76,8 +75,8 @@ struct PlantSettings {
   /// torque than a motion shows, and steps short enough to be far more exact than these.
   double relative_tolerance = 1e-3;
   double absolute_tolerance = 1e-4;  ///< of u (rad); kVelocityTolerance times that of u' (rad/s)
-  double max_step_s = 1e-3;          ///< 0: as long as the tolerances allow
-  bool account_energy = false;       ///< integrate work and dissipation along
+  double max_step_s = 1e-3;
+  bool account_energy = false;  ///< integrate work and dissipation along
   std::uint64_t seed = 1;
 };
 

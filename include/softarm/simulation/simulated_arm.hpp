@@ -6,6 +6,8 @@
 #include <vector>
 
 #include "softarm/actuation/command_expiry.hpp"
+#include "softarm/actuation/pressure_allocator.hpp"
+#include "softarm/base/time.hpp"
 #include "softarm/simulation/arm_plant.hpp"
 #include "softarm/simulation/mocap_simulator.hpp"
 #include "softarm/simulation/settings.hpp"
@@ -16,9 +18,9 @@ namespace softarm {
 /// argument, in nanoseconds of whichever monotonic clock the caller uses; it never goes back.
 ///
 ///     SimulatedArm arm(settings, now);
-///     arm.command(command, now);            // as it arrives
-///     arm.advance_to(now);                  // captures and expiries on the way happen at their
-///     own times while (arm.receive(frame)) { ... }    // what has arrived by now
+///     arm.command(command, now);         // as it arrives
+///     arm.advance_to(now);               // captures and expiries on the way at their own times
+///     while (arm.receive(frame)) { ... } // what has arrived by now
 ///
 /// Same settings, same calls: same bits.
 class SimulatedArm {
@@ -27,11 +29,14 @@ class SimulatedArm {
   /// valid for longer than `longest_validity_ns`.
   /// @throw std::invalid_argument as ArmPlant and MocapSimulator.
   SimulatedArm(const PlantSettings& settings, std::int64_t start_ns,
-               std::int64_t longest_validity_ns = CommandExpiry::kNever);
+               std::int64_t longest_validity_ns = kForever);
 
   /// Takes a command that arrives at `arrival_ns`, first letting time pass until then. @throw
   /// PlantError.
   CommandVerdict command(const PressureCommand& command, std::int64_t arrival_ns);
+  /// The same for set points (bar, one a chamber) that follow those before in one process.
+  CommandVerdict command(const PressureVector& pressure_bar, std::int64_t validity_ns,
+                         std::int64_t arrival_ns);
 
   /// Lets time pass until `now_ns`; a time that has passed already changes nothing.
   /// @throw PlantError if the integrator fails; time then stands at the last event before.

@@ -82,18 +82,16 @@ class DaemonLink {
   LiveReferenceInput reference_;
   TickInput input_;
   std::int64_t now_ns_ = 0;
-  std::int64_t wall_minus_monotonic_ns_ = 0;
-  std::int64_t previous_collect_ns_ = 0;
   std::int64_t newest_measurement_ns_;
   std::int64_t newest_go_ns_;
   std::int64_t go_sequence_;
   PressureVector measured_bar_;
-  std::int64_t newest_reference_ns_ = 0;
-  std::int64_t newest_operator_ns_ = 0;
+  std::int64_t newest_reference_ns_ = kNever;
+  std::int64_t newest_operator_ns_ = kNever;
   std::int64_t reference_sequence_;
   std::int64_t operator_sequence_;
   std::int64_t commands_ = 0;
-  std::int64_t sent_us_ = 0;  ///< the newest command, as it says itself
+  std::int64_t sent_us_ = kNever;  ///< the newest command, as it says itself
   std::int64_t malformed_ = 0;
   std::int64_t unsent_ = 0;
 

@@ -10,7 +10,10 @@
 #include <string>
 #include <vector>
 
+#include "softarm/transport/arrival_clock.hpp"
+
 struct _lcm_t;
+struct _lcm_recv_buf_t;
 
 namespace softarm {
 
@@ -22,7 +25,7 @@ class TransportError : public std::runtime_error {
 /// A received packet; valid only during the handler.
 struct ReceivedMessage {
   std::span<const std::byte> bytes;
-  std::int64_t arrival_utime_us;  ///< wall clock, taken by LCM's receive thread
+  std::int64_t arrival_ns;  ///< at this machine, CLOCK_MONOTONIC; does not decrease (ArrivalClock)
 };
 
 /// Belongs to one thread. The C interface of LCM serves underneath, because the C++ one allocates
@@ -65,8 +68,16 @@ class LcmNode {
  private:
   bool send(const char* channel, int size) noexcept;
 
+  struct Subscription {
+    Handler handler;
+    ArrivalClock* arrivals;
+  };
+  void look_at_clocks() noexcept;
+  static void dispatch(const _lcm_recv_buf_t* packet, const char* channel, void* user) noexcept;
+
   _lcm_t* lcm_ = nullptr;
-  std::deque<Handler> handlers_;  // stable addresses: LCM keeps a pointer to each
+  ArrivalClock arrivals_;
+  std::deque<Subscription> subscriptions_;  // stable addresses: LCM keeps a pointer to each
   std::vector<std::byte> buffer_;
 };
 

@@ -7,14 +7,13 @@
 #include "softarm/estimation/mocap_frame.hpp"
 #include "softarm/model/arm.hpp"
 #include "softarm/transport/mocap_format.hpp"
+#include "softarm/transport/pose_convention.hpp"
 #include "softarm/transport/settings.hpp"
 
 namespace softarm {
 
-/// Picks the base and the segment ends out of whatever bodies a frame carries, and finds where
-/// their frames S_i are: with the position p and orientation R that were sent, A the rotation
-/// mocap.axes, s the unit, and the plate's t and E,
-///   R_world = A R E,  p_world = s A p + A R t.
+/// Picks the base and the segment ends out of whatever bodies a frame carries, and brings them to
+/// our world by their PoseConvention (mocap.unit, mocap.axes, and the poses of S_i on the bodies).
 /// A body that is absent counts as not seen. What is left at its default changes no bit.
 class MocapAdapter {
  public:
@@ -38,11 +37,6 @@ class MocapAdapter {
   bool base_is_fixed() const noexcept { return bodies_.base_id < 0; }
 
  private:
-  struct Plate {
-    bool given = false;
-    Eigen::Vector3d position_m = Eigen::Vector3d::Zero();
-    Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();
-  };
   int id(std::size_t body) const noexcept {
     return body == 0 ? bodies_.base_id : bodies_.segment_ids[body - 1];
   }
@@ -50,11 +44,7 @@ class MocapAdapter {
   BodySettings bodies_;
   BodyPose fixed_base_;
   bool xyzw_;
-  double unit_m_;
-  bool turned_;
-  Eigen::Quaterniond axes_;
-  Eigen::Matrix3d axes_matrix_;
-  std::vector<Plate> plate_;  // of the base, then of the segments' ends
+  std::vector<PoseConvention> convention_;  // of the base, then of the segments' ends
 };
 
 }  // namespace softarm

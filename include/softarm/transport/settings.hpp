@@ -1,5 +1,6 @@
 // What an experiment may choose about the wire: LCM's network and channels, and what motion-capture
 // messages mean.
+// config/template.yaml documents every setting.
 #pragma once
 
 #include <Eigen/Core>
@@ -21,10 +22,10 @@ struct LcmSettings {
   std::string operator_channel = "SOFTARM_OPERATOR";
   std::string status_channel = "SOFTARM_STATUS";
   std::string timing_channel = "SOFTARM_TIMING";
-  std::string tick_channel = "SOFTARM_TICK";  ///< records for replay; empty: none
+  std::string tick_channel = "SOFTARM_TICK";
   std::string valves_channel = "SOFTARM_VALVES";
-  std::string plant_channel = "SOFTARM_PLANT";  ///< a simulated arm's true state, for reports
-  std::string deadman_channel;                  ///< of a dead-man input; empty: there is none
+  std::string plant_channel = "SOFTARM_PLANT";
+  std::string deadman_channel;
 };
 
 /// Of positions as they are sent.
@@ -41,8 +42,8 @@ struct MocapSourceSettings {
 
 /// A marker plate: where on it the frame S_i sits that the arm is made of.
 struct PlateSettings {
-  std::string name;  ///< of the body, where bodies have names instead of ids
-  Eigen::Vector3d position_m = Eigen::Vector3d::Zero();  ///< of S_i in the body's own frame
+  std::string name;
+  Eigen::Vector3d position_m = Eigen::Vector3d::Zero();
   /// Rotation vector of S_i in the body's own frame: R_world_S = R_world_body exp(rotation^).
   Eigen::Vector3d rotation_rad = Eigen::Vector3d::Zero();
 

@@ -7,7 +7,7 @@
 #include <string>
 
 #include "softarm/valves/settings.hpp"
-#include "softarm/valves/valve_guard.hpp"
+#include "softarm/valves/valve_backend.hpp"
 
 struct _modbus;
 

@@ -6,9 +6,9 @@
 #include <cstdint>
 #include <span>
 #include <string>
-#include <vector>
 
 #include "softarm/valves/settings.hpp"
+#include "softarm/valves/valve_backend.hpp"
 
 namespace softarm {
 
@@ -39,20 +39,6 @@ double register_pressure_bar(const RegisterMap& map, std::uint16_t word) noexcep
 void put_set_points(const RegisterMap& map, std::span<const int> order,
                     const Eigen::VectorXd& set_points_bar, double max_bar,
                     std::span<std::uint16_t> words) noexcept;
-
-/// What a terminal says about the valves of all chambers.
-struct ReadBack {
-  explicit ReadBack(int chambers)
-      : actual_bar(Eigen::VectorXd::Zero(chambers)),
-        echo_bar(actual_bar),
-        diagnosis(static_cast<std::size_t>(chambers), 0) {}
-
-  Eigen::VectorXd actual_bar;  ///< measured
-  Eigen::VectorXd echo_bar;    ///< set points as the terminal has them, if `has_echo`
-  bool has_echo = false;
-  std::vector<std::uint16_t> diagnosis;  ///< already masked
-  bool ready = true;                     ///< every slot in use regulates
-};
 
 /// Takes the block of measured pressures (`read_size` words) apart.
 void take_read_back(const RegisterMap& map, std::span<const int> order,

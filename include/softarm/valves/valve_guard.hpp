@@ -7,8 +7,9 @@
 #include <vector>
 
 #include "softarm/actuation/command_expiry.hpp"
-#include "softarm/valves/register_map.hpp"
+#include "softarm/base/time.hpp"
 #include "softarm/valves/settings.hpp"
+#include "softarm/valves/valve_backend.hpp"
 
 namespace softarm {
 
@@ -19,7 +20,7 @@ enum class ValveState : std::int8_t {
   starting,      ///< set points of zero, until the terminal is ready and reads back well
   vented,        ///< set points of zero: no command is in force, or none may be
   running,       ///< the command in force is written
-  doubt          ///< set points of zero, until all has been well for a while
+  degraded       ///< set points of zero: a fault was seen; left when all has been well for a while
 };
 const char* name(ValveState state) noexcept;
 
@@ -40,9 +41,6 @@ enum class ValveReason : std::int8_t {
 };
 const char* name(ValveReason reason) noexcept;
 
-/// How a request to the terminal ended.
-enum class LinkResult { ok, no_answer, exception_reply, broken };
-
 /// What the driver does next.
 enum class ValveAction {
   wait,     ///< nothing
@@ -58,7 +56,7 @@ struct ValveGuardSettings {
   double max_pressure_bar = 2.0;
   double rise_bar_per_s = 8.0;      ///< of set points on the way from vented to what is commanded
   double longest_validity_s = 0.1;  ///< of a command, whatever it says of itself
-  bool wait_for_zero = false;  ///< after a doubt (and at first) commands must have been zero once
+  bool wait_for_zero = false;  ///< after DEGRADED (and at first) commands must have been zero once
 };
 
 /// What happened since the start of the driver.
@@ -68,7 +66,7 @@ struct ValveCounters {
   std::int64_t exceptions = 0;
   std::int64_t no_answers = 0;
   std::int64_t broken = 0;  ///< connections lost
-  std::int64_t doubts = 0;
+  std::int64_t times_degraded = 0;
 };
 
 /// Time is an argument (ns of a monotonic clock that never goes back). Once a cycle: `wake`, the
@@ -103,7 +101,7 @@ class ValveGuard {
 
   ValveState state() const noexcept { return state_; }
   ValveReason reason() const noexcept { return reason_; }
-  /// The chamber that a doubt, or a report of a stuck valve, is about; -1: none.
+  /// The chamber that DEGRADED, or a report of a stuck valve, is about; -1: none.
   int chamber() const noexcept { return chamber_; }
   /// Of the command whose set points are written, CommandExpiry::kNoSequence where none is.
   std::int64_t sequence() const noexcept {
@@ -114,11 +112,9 @@ class ValveGuard {
   const ValveCounters& counters() const noexcept { return counters_; }
 
  private:
-  static constexpr std::int64_t kLongAgo = INT64_MIN;
-
   void enter(ValveState state, ValveReason reason) noexcept;
   void disconnect(ValveReason reason, std::int64_t now_ns) noexcept;
-  void doubt(ValveReason reason, int chamber) noexcept;
+  void degrade(ValveReason reason, int chamber) noexcept;
   void failed(LinkResult result, std::int64_t now_ns) noexcept;
   ValveReason fault(const ReadBack& read_back, int& chamber) const noexcept;
   int stuck_chamber(const ReadBack& read_back, std::int64_t now_ns) noexcept;
@@ -136,21 +132,22 @@ class ValveGuard {
   ValveState state_ = ValveState::disconnected;
   ValveReason reason_ = ValveReason::no_connection;
   int chamber_ = -1;
-  std::int64_t woken_ns_ = kLongAgo;
-  std::int64_t next_attempt_ns_ = kLongAgo;
+  std::int64_t woken_ns_ = kNever;
+  std::int64_t next_attempt_ns_ = kNever;
   std::int64_t backoff_ns_;
-  std::int64_t since_ns_ = 0;  ///< when starting began, or the first of `failures_` happened
-  std::int64_t written_ns_ = kLongAgo;
-  std::int64_t listening_since_ns_ = kLongAgo;  ///< for commands of zero, or none
-  std::int64_t answered_ns_ = 0;                ///< the cycle of the newest exchange that went well
-  int failures_ = 0;                            ///< in a row
-  int good_cycles_ = 0;                         ///< in a row
+  std::int64_t starting_since_ns_ = 0;
+  std::int64_t failing_since_ns_ = 0;  ///< the first of `failures_`
+  std::int64_t written_ns_ = kNever;
+  std::int64_t listening_since_ns_ = kNever;  ///< for commands of zero, or none
+  std::int64_t answered_ns_ = 0;              ///< the cycle of the newest exchange that went well
+  int failures_ = 0;                          ///< in a row
+  int good_cycles_ = 0;                       ///< in a row
   bool must_see_zero_;
   bool rising_ = true;  ///< on the way from vented to what is commanded
   bool stopping_ = false;
   bool zero_confirmed_ = true;
   Eigen::VectorXd set_points_bar_;
-  std::vector<std::int64_t> off_since_ns_;  ///< kLongAgo while a chamber follows its set point
+  std::vector<std::int64_t> off_since_ns_;  ///< kNever while a chamber follows its set point
   ValveCounters counters_;
 };
 

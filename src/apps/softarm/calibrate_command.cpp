@@ -13,6 +13,7 @@
 #include "apps/signals.hpp"
 #include "apps/softarm/commands.hpp"
 #include "softarm/base/clock.hpp"
+#include "softarm/base/time.hpp"
 #include "softarm/base/version.hpp"
 #include "softarm/commissioning/calibration/rest_calibration.hpp"
 #include "softarm/config/load.hpp"
@@ -62,7 +63,7 @@ class Watcher {
   std::vector<MocapFrame> watch(double duration_s) {
     Progress progress;
     const std::int64_t begin_ns = monotonic_now_ns();
-    const auto span_ns = static_cast<std::int64_t>(1e9 * duration_s);
+    const auto span_ns = to_ns(duration_s);
     for (std::int64_t now_ns = begin_ns; stop_requested == 0; now_ns = monotonic_now_ns()) {
       if (frames_.empty() && now_ns - begin_ns > kPatience_ns)
         throw std::runtime_error(

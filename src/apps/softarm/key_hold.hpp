@@ -3,6 +3,8 @@
 
 #include <cstdint>
 
+#include "softarm/base/time.hpp"
+
 namespace softarm {
 
 /// Held from the first event until the repeats stay away. Keyboards repeat after 0.25 to 0.7 s for
@@ -21,7 +23,6 @@ class KeyHold {
   }
 
  private:
-  static constexpr std::int64_t kNever = INT64_MIN;
   std::int64_t last_ns_ = kNever;
   bool repeats_ = false;
 };

@@ -8,6 +8,7 @@
 #include "apps/progress.hpp"
 #include "apps/signals.hpp"
 #include "softarm/base/clock.hpp"
+#include "softarm/base/time.hpp"
 #include "softarm/commissioning/preflight/checks.hpp"
 
 namespace softarm {
@@ -15,13 +16,13 @@ namespace {
 
 void listen(LcmNode& node, ArmListener& listener, double time_s, Progress& progress) {
   const std::int64_t start_ns = monotonic_now_ns();
-  const auto end_ns = start_ns + static_cast<std::int64_t>(1e9 * time_s);
+  const auto end_ns = start_ns + to_ns(time_s);
   for (std::int64_t now_ns = start_ns; now_ns < end_ns && stop_requested == 0;
        now_ns = monotonic_now_ns()) {
     node.wait_until(std::min(end_ns, now_ns + 10'000'000));
     listener.look_at_clock();
     progress.update(fmt::format("listening: {:.0f} of {:.0f} s, {} frames",
-                                1e-9 * static_cast<double>(now_ns - start_ns), time_s,
+                                to_seconds(now_ns - start_ns), time_s,
                                 listener.seen().frames.size()));
   }
   listener.seen().rest_end_ns = monotonic_now_ns();

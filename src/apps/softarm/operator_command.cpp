@@ -17,6 +17,7 @@
 #include "apps/signals.hpp"
 #include "apps/softarm/commands.hpp"
 #include "softarm/base/clock.hpp"
+#include "softarm/base/time.hpp"
 #include "softarm/config/config_error.hpp"
 #include "softarm/config/load.hpp"
 #include "softarm/runtime/safety_monitor.hpp"
@@ -68,11 +69,7 @@ constexpr Kind kKinds[] = {
 
 /// The date: it counts up from one call to the next, also after a restart of this machine and from
 /// one machine to another, where the monotonic clock would not.
-std::int64_t date_ns() {
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(
-             std::chrono::system_clock::now().time_since_epoch())
-      .count();
-}
+std::int64_t next_sequence() { return wall_now_ns(); }
 
 std::string state_text(const controller_status_t& status) {
   return fmt::format("{} ({})", name(static_cast<Mode>(status.mode)),
@@ -135,8 +132,8 @@ int request(const std::string& config, const Kind& kind) {
   const std::int64_t start_ns = monotonic_now_ns();
   for (std::int64_t now_ns = start_ns; now_ns - start_ns < kPatience_ns;
        now_ns = monotonic_now_ns()) {
-    sent |=
-        node.publish(lcm.operator_channel, Request{.sequence = date_ns(), .request = kind.request});
+    sent |= node.publish(lcm.operator_channel,
+                         Request{.sequence = next_sequence(), .request = kind.request});
     const std::int64_t pause_end_ns = now_ns + 50'000'000;
     while (monotonic_now_ns() < pause_end_ns) node.wait_until(pause_end_ns);
     if (heard && kind.understood(status)) {
@@ -170,15 +167,16 @@ int hold_deadman(const std::string& config) {
   LcmNode node(lcm.url);
   const auto period_ns = static_cast<std::int64_t>(1e8 * experiment.safety.deadman_timeout_s);
   fmt::print("saying go on {} every {:.3g} s until Ctrl-C\n", lcm.deadman_channel,
-             1e-9 * static_cast<double>(period_ns));
+             to_seconds(period_ns));
   std::fflush(stdout);
   while (stop_requested == 0) {
     if (!node.publish(lcm.deadman_channel,
-                      softarm_messages::deadman_t{.sequence = date_ns(), .go = 1}))
+                      softarm_messages::deadman_t{.sequence = next_sequence(), .go = 1}))
       throw TransportError(kUnsent);
     sleep_until_ns(monotonic_now_ns() + period_ns);  // after a stop of ours nothing is made up for
   }
-  node.publish(lcm.deadman_channel, softarm_messages::deadman_t{.sequence = date_ns(), .go = 0});
+  node.publish(lcm.deadman_channel,
+               softarm_messages::deadman_t{.sequence = next_sequence(), .go = 0});
   return kExitOk;
 }
 

@@ -13,6 +13,7 @@
 #include "softarm/base/version.hpp"
 #include "softarm/config/load.hpp"
 #include "softarm/recording/replay.hpp"
+#include "softarm/recording/replay_text.hpp"
 
 namespace softarm {
 namespace {
@@ -25,68 +26,7 @@ struct ReplayOptions {
 
 int exit_code(const ReplaySummary& summary, const EventLogReader& log) {
   if (summary.different()) return kExitDifferent;
-  return summary.complete() && log.damage_count() == 0 ? kExitOk : kExitData;
-}
-
-void say_counts(const ReplaySummary& summary) {
-  const auto line = [](const char* what, const ReplayCount& count) {
-    fmt::print("  {:<34} {:>10} compared, {} different\n", what, count.compared, count.different);
-  };
-  fmt::print("{} ticks of {} {} of the daemon, {:.3f} s\n", summary.ticks, summary.runs,
-             summary.runs == 1 ? "run" : "runs", summary.duration_s);
-  line("commands as decided (double)", summary.records);
-  line("commands as sent", summary.commands);
-  line("statuses", summary.statuses);
-  if (summary.after_gap.compared > 0) line("commands after a gap, no proof", summary.after_gap);
-}
-
-void say_gaps(const ReplaySummary& summary) {
-  for (const ReplayGap& gap : summary.gaps)
-    fmt::print("gap: ticks {} to {} are not in the log ({} of them, before {:.3f} s, byte {})\n",
-               gap.first, gap.last, gap.last - gap.first + 1, gap.time_s, gap.position);
-  if (summary.gap_count > static_cast<std::int64_t>(summary.gaps.size()))
-    fmt::print("gaps: {} in all, {} ticks\n", summary.gap_count, summary.missing_ticks);
-  if (summary.gap_count == 0) return;
-  fmt::print("The pipeline's state after a gap is not known, so nothing after it is proof. {}\n",
-             summary.agrees_again < 0
-                 ? "Commands did not come to agree again."
-                 : fmt::format("Commands agree again from tick {} on.", summary.agrees_again));
-  if (summary.gaps.front().first == 1)
-    fmt::print("The first ticks are missing: start lcm-logger before the daemon.\n");
-}
-
-void say_difference(const ReplayDifference& first) {
-  fmt::print("first difference: tick {} of run {}, {:.6f} s after its first, byte {} of the log\n",
-             first.tick, first.run, first.time_s, first.position);
-  for (const FieldDifference& each : first.fields)
-    fmt::print("  {}{}: recorded {}, replayed {}\n", each.field,
-               each.unit.empty() ? "" : fmt::format(" [{}]", each.unit), each.recorded,
-               each.replayed);
-}
-
-void say_report(const ReplayOptions& options, const ReplaySummary& summary,
-                const EventLogReader& log) {
-  say_counts(summary);
-  if (log.damage_count() > 0 || summary.malformed > 0) {
-    for (const LogDamage& each : log.damages())
-      fmt::print("damage: bytes {} to {} of {} hold no whole message\n", each.begin, each.end,
-                 options.log);
-    fmt::print(
-        "{} damaged stretches, {} bytes; {} messages on our channels that are none; what "
-        "precedes and follows them was used\n",
-        log.damage_count(), log.damaged_bytes(), summary.malformed);
-  }
-  say_gaps(summary);
-  if (summary.different()) {
-    say_difference(summary.first);
-    fmt::print("DIFFERENT\n");
-  } else {
-    fmt::print("{}\n", exit_code(summary, log) == kExitOk
-                           ? "IDENTICAL: every command and status, bit for bit"
-                       : summary.records.compared + summary.commands.compared == 0
-                           ? "INCOMPLETE: nothing could be compared"
-                           : "INCOMPLETE: what could be compared is identical, bit for bit");
-  }
+  return is_identical(summary, log) ? kExitOk : kExitData;
 }
 
 void write_count(JsonWriter& json, const char* name, const ReplayCount& count) {
@@ -122,7 +62,7 @@ void write_difference(JsonWriter& json, const ReplaySummary& summary) {
 std::string json_report(const ReplaySummary& summary, const EventLogReader& log) {
   JsonWriter json;
   json.open_object();
-  json.member("identical", exit_code(summary, log) == kExitOk);
+  json.member("identical", is_identical(summary, log));
   json.member("runs", summary.runs);
   json.member("ticks", summary.ticks);
   json.member("duration_s", summary.duration_s);
@@ -181,7 +121,7 @@ int replay(const ReplayOptions& options) {
   if (options.json) {
     fmt::print("{}\n", json_report(summary, log));
   } else {
-    say_report(options, summary, log);
+    fmt::print("{}", replay_text(summary, log, options.log));
   }
   if (summary.ticks == 0)
     print_error("softarm",

@@ -11,6 +11,7 @@
 #include "apps/softarm/commands.hpp"
 #include "apps/softarm/plots.hpp"
 #include "softarm/base/clock.hpp"
+#include "softarm/base/time.hpp"
 #include "softarm/config/load.hpp"
 #include "softarm/recording/experiment_log.hpp"
 #include "softarm/recording/logged_run.hpp"
@@ -31,18 +32,25 @@ struct RunOptions {
   bool has_seed = false;
 };
 
+struct Recorded {
+  std::int64_t took_ns = 0;  ///< wall time, log and all
+  bool was_active = false;
+};
+
 /// Steps whatever makes the rows to its end, or to `duration_s`; every tick, or every
-/// `ticks_a_row` of them, is a row. Returns the wall time it took, log and all, in ns.
+/// `ticks_a_row` of them, is a row.
 template <class Stepper>
-std::int64_t record(Stepper& stepper, double duration_s, double period_s, std::int64_t ticks_a_row,
-                    ExperimentLog& log, ShapeLog& shapes, TrackingSummary& summary) {
+Recorded record(Stepper& stepper, double duration_s, double period_s, std::int64_t ticks_a_row,
+                ExperimentLog& log, ShapeLog& shapes, TrackingSummary& summary) {
   Progress progress;
+  Recorded recorded;
   LogRow row;
   const std::int64_t before_ns = monotonic_now_ns();
   const auto ticks = static_cast<std::int64_t>(std::llround(duration_s / period_s));
   for (std::int64_t k = 0; k < ticks; ++k) {
     const bool logged = k % ticks_a_row == 0;
     if (!stepper.step(row, logged)) break;
+    recorded.was_active |= stepper.pipeline().output().mode == Mode::active;
     if (!logged) continue;
     log.add(row);
     shapes.add(row);
@@ -52,7 +60,18 @@ std::int64_t record(Stepper& stepper, double duration_s, double period_s, std::i
   }
   const ControlPipeline& pipeline = stepper.pipeline();
   summary.set_frames(pipeline.counters(), pipeline.late_frames());
-  return monotonic_now_ns() - before_ns;
+  recorded.took_ns = monotonic_now_ns() - before_ns;
+  return recorded;
+}
+
+/// Why an arm was never ACTIVE, from where it stood at the end.
+std::string never_active(const TickOutput& end, const Experiment& experiment, double duration_s) {
+  std::string text = fmt::format("the arm was never ACTIVE in {:.3g} s: {} ({})", duration_s,
+                                 name(end.mode), name(end.reason));
+  if (end.reason == Reason::waiting_for_frames)
+    text += fmt::format("; it takes {} good frames in a row (safety.good_frames)",
+                        experiment.safety.good_frames);
+  return text;
 }
 
 int run(const RunOptions& options) {
@@ -65,17 +84,20 @@ int run(const RunOptions& options) {
   TrackingSummary summary(experiment.arm.size(), experiment.run.tracking_from_s);
   if (experiment.actuation.kind == ActuationKind::torque) summary.commands_are_torques();
   TimingReport timing;
+  std::string failure;
   const auto record_and_report = [&](auto& stepper) {
     ExperimentLog log(options.out, experiment);
     ShapeLog shapes(options.out, experiment);
     const double log_rate_hz = experiment.run.log_rate_hz;
     const std::int64_t ticks_a_row =
         log_rate_hz > 0.0 ? std::max(1LL, std::llround(experiment.rate_hz / log_rate_hz)) : 1;
-    const std::int64_t took_ns =
+    const Recorded recorded =
         record(stepper, duration_s, period_s, ticks_a_row, log, shapes, summary);
     log.close();
     timing.real_time_factor =
-        1e9 * summary.duration_s() / static_cast<double>(std::max<std::int64_t>(1, took_ns));
+        summary.duration_s() / to_seconds(std::max<std::int64_t>(1, recorded.took_ns));
+    if (!recorded.was_active)
+      failure = never_active(stepper.pipeline().output(), experiment, summary.duration_s());
     timing.histograms = {{"tick_us", stepper.tick_times().counts(), stepper.tick_times().max_us()}};
   };
   std::unique_ptr<LoggedRun> logged;
@@ -91,11 +113,12 @@ int run(const RunOptions& options) {
   fmt::print("{}{:.0f} times faster than real time; log, summary and timing are in {}\n",
              summary.table(), timing.real_time_factor, options.out);
   if (options.plots) draw_plots(options.out);
+  if (!failure.empty()) print_error("softarm", failure);
   if (logged && logged->log().damage_count() > 0) {
     print_error("softarm", options.mocap_log + ": " + logged->log().damage_text());
     return kExitData;
   }
-  return kExitOk;
+  return failure.empty() ? kExitOk : kExitFailure;
 }
 
 }  // namespace

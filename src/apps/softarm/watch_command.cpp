@@ -13,6 +13,7 @@
 #include "apps/signals.hpp"
 #include "apps/softarm/commands.hpp"
 #include "softarm/base/clock.hpp"
+#include "softarm/base/time.hpp"
 #include "softarm/config/load.hpp"
 #include "softarm/recording/status_record.hpp"
 #include "softarm/transport/lcm_node.hpp"
@@ -126,7 +127,7 @@ class LiveView {
     const std::int64_t span_ns = now_ns - counted_ns_;
     if (span_ns < kRateSpan_ns) return;
     if (counted_ns_ > 0) {
-      const double span_s = 1e-9 * static_cast<double>(span_ns);
+      const double span_s = to_seconds(span_ns);
       status_hz_ = static_cast<double>(record.rows() - rows_) / span_s;
       frames_hz_ = static_cast<double>(record.status().frames_accepted - frames_) / span_s;
     }

@@ -2,14 +2,13 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/LU>
 #include <cmath>
 #include <span>
 #include <stdexcept>
 
 #include "softarm/estimation/curvature_estimator.hpp"
-#include "softarm/model/dynamics.hpp"
-#include "softarm/model/kinematics.hpp"
+#include "softarm/model/statics.hpp"
+#include "softarm/transport/pose_convention.hpp"
 #include "softarm/transport/settings.hpp"
 
 namespace softarm {
@@ -17,30 +16,14 @@ namespace {
 
 constexpr std::size_t kFewestFrames = 50;
 
-Eigen::Isometry3d pose_of(const PlateSettings& plate) {
-  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
-  const double angle = plate.rotation_rad.norm();
-  if (angle > 0.0)
-    pose.linear() = Eigen::AngleAxisd(angle, plate.rotation_rad / angle).toRotationMatrix();
-  pose.translation() = plate.position_m;
-  return pose;
-}
+Eigen::Isometry3d pose_of(const PlateSettings& plate) { return to_isometry(pose_on_body(plate)); }
 
-void set(PlateSettings& plate, const Eigen::Isometry3d& pose) {
-  const Eigen::AngleAxisd turn(pose.linear());
-  plate.rotation_rad = turn.angle() * turn.axis();
-  plate.position_m = pose.translation();
-}
-
-/// K u + G(u) in N m.
-Eigen::VectorXd moments(const ArmParameters& arm, DynamicsWorkspace& workspace,
-                        const Eigen::VectorXd& u) {
-  const Eigen::VectorXd none = Eigen::VectorXd::Zero(u.size());
-  SegmentVector out(u.size());
-  inverse_dynamics(arm, workspace, u, none, none, none,
-                   {.inertia = false, .coriolis = false, .gravity = true}, out);
-  add_impedance(arm, u, none, out);
-  return out;
+/// The shape that gravity gives the arm without pressure.
+Eigen::VectorXd hanging_shape(const ArmParameters& arm) {
+  if (const auto u = rest_shape(arm, Eigen::VectorXd::Zero(arm.dof()))) return *u;
+  throw std::runtime_error(
+      "the model has no shape at rest near straight: expected stiffness that holds the arm's "
+      "weight (arm.stiffness_nm_per_rad, arm.mass_kg, arm.base.rotation)");
 }
 
 std::vector<RestReading> read_segments(const Experiment& experiment, const BodySettings& bodies,
@@ -77,21 +60,18 @@ Eigen::Isometry3d levelled(const Eigen::Isometry3d& base, const ArmParameters& a
 BodySettings plates_from(const Experiment& experiment, const Eigen::VectorXd& rest_u_rad,
                          std::span<const Eigen::Isometry3d> mean, BaseSource source) {
   BodySettings out = experiment.transport.bodies;
-  const ArmParameters& arm = experiment.arm;
-  Eigen::Isometry3d base = mean[0];
-  if (out.base_id >= 0) {
-    base = base * pose_of(out.base_plate);
-    if (source == BaseSource::arm) base = levelled(base, arm);
-    if (source == BaseSource::arm) set(out.base_plate, mean[0].inverse() * base);
-  }
-  ArmParameters at_base = arm;
+  const bool fixed = out.base_id < 0;
+  Eigen::Isometry3d base = fixed ? mean[0] : mean[0] * pose_of(out.base_plate);
+  if (!fixed && source == BaseSource::arm) base = levelled(base, experiment.arm);
+  ArmParameters at_base = experiment.arm;
   at_base.base_position_m = base.translation();
   at_base.base_rotation = base.linear();
-  std::vector<Eigen::Isometry3d> ends(static_cast<std::size_t>(arm.size()));
-  forward_kinematics(at_base, rest_u_rad, ends);
-  out.segment_plates.resize(ends.size());
-  for (std::size_t i = 0; i < ends.size(); ++i)
-    set(out.segment_plates[i], mean[i + 1].inverse() * ends[i]);
+  const std::vector<Eigen::Isometry3d> found = frames_on_bodies(at_base, rest_u_rad, mean);
+  if (!fixed && source == BaseSource::arm)
+    out.base_plate = with_pose_on_body(out.base_plate, found[0]);
+  out.segment_plates.resize(found.size() - 1);
+  for (std::size_t i = 1; i < found.size(); ++i)
+    out.segment_plates[i - 1] = with_pose_on_body(out.segment_plates[i - 1], found[i]);
   return out;
 }
 
@@ -217,32 +197,6 @@ std::string readings_text(const RestCalibration& found) {
 
 }  // namespace
 
-Eigen::VectorXd rest_shape(const ArmParameters& arm) {
-  constexpr double kStep_rad = 1e-6, kExact_nm = 1e-12;
-  DynamicsWorkspace workspace(arm);
-  Eigen::VectorXd u = Eigen::VectorXd::Zero(arm.dof());
-  for (int iteration = 0; iteration < 50; ++iteration) {
-    const Eigen::VectorXd residual = moments(arm, workspace, u);
-    if (residual.cwiseAbs().maxCoeff() < kExact_nm) return u;
-    Eigen::MatrixXd slope(u.size(), u.size());
-    for (Eigen::Index j = 0; j < u.size(); ++j) {
-      Eigen::VectorXd up = u, down = u;
-      up[j] += kStep_rad;
-      down[j] -= kStep_rad;
-      slope.col(j) =
-          (moments(arm, workspace, up) - moments(arm, workspace, down)) / (2.0 * kStep_rad);
-    }
-    const Eigen::VectorXd step = slope.fullPivLu().solve(residual);
-    u -= step;
-    if (!u.allFinite()) break;
-    if (step.cwiseAbs().maxCoeff() < 1e-12) return u;
-  }
-  throw std::runtime_error(
-      "the model has no shape at rest near straight: expected stiffness that holds the arm's "
-      "weight "
-      "(arm.stiffness_nm_per_rad, arm.mass_kg, arm.base.rotation)");
-}
-
 RestCalibration calibrate_rest(const Experiment& experiment, const std::vector<MocapFrame>& frames,
                                BaseSource base) {
   const auto poses = gather(experiment, frames);
@@ -253,7 +207,7 @@ RestCalibration calibrate_rest(const Experiment& experiment, const std::vector<M
   for (std::size_t i = fixed ? 1 : 0; i < poses.size(); ++i)
     out.body[i] = pose_statistics(poses[i]);
   expect_still(out.body);
-  out.rest_u_rad = rest_shape(experiment.arm);
+  out.rest_u_rad = hanging_shape(experiment.arm);
   const auto all = means(poses, fixed, 0, count);
   const auto first = means(poses, fixed, 0, count / 2);
   const auto second = means(poses, fixed, count / 2, count - count / 2);

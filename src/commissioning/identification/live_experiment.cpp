@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "softarm/base/clock.hpp"
+#include "softarm/base/time.hpp"
 #include "softarm/client/arm_listener.hpp"
 #include "softarm/client/commander.hpp"
 
@@ -22,8 +23,6 @@ struct Sample {
   std::int64_t time_ns;
   Eigen::VectorXd value;
 };
-
-double seconds(std::int64_t time_ns) { return 1e-9 * static_cast<double>(time_ns); }
 
 class LiveExperiment {
  public:
@@ -42,7 +41,7 @@ class LiveExperiment {
     try {
       wait_for_rest();
       const std::int64_t start_ns = monotonic_now_ns();
-      const auto hold_ns = static_cast<std::int64_t>(1e9 * hold_s);
+      const auto hold_ns = to_ns(hold_s);
       for (std::size_t k = 0; k < steps.size() && why.empty(); ++k) {
         if (progress_) progress_(fmt::format("step {} of {}", k + 1, steps.size()));
         why = play(steps[k], start_ns + static_cast<std::int64_t>(k + 1) * hold_ns);
@@ -136,7 +135,7 @@ class LiveExperiment {
       value.resize(rows, from.front().value.size());
       for (Eigen::Index k = 0; k < rows; ++k) {
         const Sample& sample = from[static_cast<std::size_t>(k)];
-        time_s[k] = seconds(sample.time_ns - zero_ns);
+        time_s[k] = to_seconds(sample.time_ns - zero_ns);
         value.row(k) = sample.value;
       }
     };

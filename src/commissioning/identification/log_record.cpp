@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <vector>
 
+#include "softarm/base/time.hpp"
 #include "softarm/estimation/curvature_estimator.hpp"
 #include "softarm/transport/message_decoding.hpp"
 #include "softarm/transport/mocap_source.hpp"
@@ -124,7 +125,7 @@ class LogReader {
   std::size_t chambers_ = 0;
   Samples frames_, inputs_;
   std::int64_t start_us_ = -1, arrival_ns_ = 0;
-  std::int64_t last_frame_ = INT64_MIN;
+  std::int64_t last_frame_ = kNever;
   std::int64_t wrong_size_ = 0;
   MocapFrame frame_;
   CurvatureEstimate estimate_;

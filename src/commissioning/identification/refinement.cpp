@@ -35,7 +35,17 @@ class Comparison {
                       std::max<Eigen::Index>(0, record.time_s.size() - first_)));
   }
 
-  double step_s(const Eigen::VectorXd& x) const { return model_.longest_step_s(set_.arm(x)); }
+  /// The response at `x`, and the step that it took: the longest that is stable straight and at
+  /// rest, or, as a bent arm may be faster, a half, a fourth or an eighth of that.
+  /// @throws std::runtime_error where none of them gives a bounded response
+  double response(const Eigen::VectorXd& x, Eigen::MatrixXd& u) const {
+    const double longest_s = model_.longest_step_s(set_.arm(x));
+    for (const double part : {1.0, 0.5, 0.25, 0.125})
+      if (simulate(x, part * longest_s, u)) return part * longest_s;
+    throw std::runtime_error(
+        "the arm as modelled has no bounded response to this input: check mass, stiffness and "
+        "gains of the configuration");
+  }
 
   /// A step that is stable at `x`: the one given as long as it is, so that the response stays a
   /// smooth function of x. Zero where there is none.
@@ -45,7 +55,7 @@ class Comparison {
     return longest_s < kStillStable * step_s ? kStillStable * longest_s : step_s;
   }
 
-  bool simulate(const Eigen::VectorXd& x, double step_s, Eigen::MatrixXd& u) const {
+  [[nodiscard]] bool simulate(const Eigen::VectorXd& x, double step_s, Eigen::MatrixXd& u) const {
     if (!(step_s > 0.0) || !set_.possible(x)) return false;
     Eigen::MatrixXd all;
     if (!model_.simulate(set_.arm(x), step_s, all)) return false;
@@ -53,8 +63,9 @@ class Comparison {
     return true;
   }
 
-  bool sensitivities(const Eigen::VectorXd& x, double step_s, const Eigen::MatrixXd& at,
-                     int threads, Eigen::MatrixXd& J) const {
+  [[nodiscard]] bool sensitivities(const Eigen::VectorXd& x, double step_s,
+                                   const Eigen::MatrixXd& at, int threads,
+                                   Eigen::MatrixXd& J) const {
     J.resize(at.size(), set_.size());
     std::atomic<bool> good = true;
     in_parallel(static_cast<int>(set_.size()), threads, [&](int i) {
@@ -116,13 +127,10 @@ class Search {
         options_(options),
         measured_(comparison.measured()) {}
 
-  void run(Refinement& out) {
-    step_s_ = comparison_.step_s(out.x);
+  /// The response at the x that was found.
+  Eigen::MatrixXd run(Refinement& out) {
     Eigen::MatrixXd u;
-    if (!comparison_.simulate(out.x, step_s_, u))
-      throw std::runtime_error(
-          "the arm as believed has no bounded response to this input: check mass, stiffness and "
-          "gains of the configuration");
+    step_s_ = comparison_.response(out.x, u);
     double damping = 1e-6;
     for (int weighting = 0; weighting < kWeightings; ++weighting) {
       whiten_ = whitener(measured_ - u, options_.weighted);
@@ -135,6 +143,7 @@ class Search {
       }
     }
     finish(out, u);
+    return u;
   }
 
  private:
@@ -281,10 +290,7 @@ Refinement refine(const ParameterSet& set, const MotionRecord& record, const Eig
   const Comparison comparison(set, record);
   Refinement out;
   out.x = start;
-  Search(comparison, set, options).run(out);
-  Eigen::MatrixXd u;
-  comparison.simulate(out.x, comparison.step_s(out.x), u);
-  compare(comparison, u, out);
+  compare(comparison, Search(comparison, set, options).run(out), out);
   return out;
 }
 
@@ -293,8 +299,7 @@ Refinement predict(const ParameterSet& set, const MotionRecord& record, const Ei
   Refinement out;
   out.x = x;
   Eigen::MatrixXd u;
-  if (!comparison.simulate(x, comparison.step_s(x), u))
-    throw std::runtime_error("the arm has no bounded response to this input");
+  comparison.response(x, u);
   compare(comparison, u, out);
   return out;
 }
@@ -302,10 +307,9 @@ Refinement predict(const ParameterSet& set, const MotionRecord& record, const Ei
 Eigen::MatrixXd sensitivities(const ParameterSet& set, const MotionRecord& record,
                               const Eigen::VectorXd& x, int threads) {
   const Comparison comparison(set, record);
-  const double step_s = comparison.step_s(x);
   Eigen::MatrixXd u, J;
-  if (!comparison.simulate(x, step_s, u) || !comparison.sensitivities(x, step_s, u, threads, J))
-    throw std::runtime_error("the arm has no bounded response to this input");
+  if (!comparison.sensitivities(x, comparison.response(x, u), u, threads, J))
+    throw std::runtime_error("the response next to these parameters is not bounded");
   return J;
 }
 

@@ -3,13 +3,14 @@
 #include <fmt/format.h>
 
 #include <Eigen/Eigenvalues>
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
 
+#include "softarm/actuation/input_map.hpp"
 #include "softarm/model/actuation_matrix.hpp"
+#include "softarm/model/statics.hpp"
 
 namespace softarm {
 namespace {
@@ -22,19 +23,14 @@ ArmHypothesis hypothesis(const ArmParameters& arm, const ActuationSettings& actu
   ArmHypothesis out;
   out.arm = arm;
   out.rest_rad.setZero(arm.dof());
-  const bool torque = actuation.kind == ActuationKind::torque;
-  for (std::size_t i = 0; i < actuation.segments.size(); ++i)
-    for (std::size_t j = 0; j < actuation.segments[i].size(); ++j) {
-      const Chamber& chamber = actuation.segments[i][j];
-      out.push.conservativeResize(2, out.push.cols() + 1);
-      if (torque) {  // A_chamber of a unit moment about x, or y
-        out.push.rightCols<1>() << (j == 0 ? 0.0 : 1.0), (j == 0 ? -1.0 : 0.0);
-      } else {
-        out.push.rightCols<1>() << -chamber.gain_nm_per_bar * std::cos(chamber.angle_rad),
-            -chamber.gain_nm_per_bar * std::sin(chamber.angle_rad);
-      }
-      out.segment_of.push_back(static_cast<int>(i));
-    }
+  out.push.resize(2, chamber_count(actuation));
+  Eigen::Index first = 0;
+  for (std::size_t i = 0; i < actuation.segments.size(); ++i) {
+    const Eigen::Matrix2Xd map = input_map(actuation.kind, actuation.segments[i]);
+    out.push.middleCols(first, map.cols()) = map;
+    out.segment_of.insert(out.segment_of.end(), actuation.segments[i].size(), static_cast<int>(i));
+    first += map.cols();
+  }
   return out;
 }
 
@@ -51,8 +47,8 @@ class Motion {
     for (SegmentParameters& segment : plain_.segments) segment.stiffness_nm_per_rad = 0.0;
   }
 
-  bool acceleration(const Eigen::VectorXd& u, const Eigen::VectorXd& v,
-                    const Eigen::VectorXd& input, Eigen::VectorXd& a) {
+  [[nodiscard]] bool acceleration(const Eigen::VectorXd& u, const Eigen::VectorXd& v,
+                                  const Eigen::VectorXd& input, Eigen::VectorXd& a) {
     push_force(arm_, u, input, force_);
     spring_force(arm_, u, spring_);
     force_ -= spring_;
@@ -63,37 +59,20 @@ class Motion {
   void imbalance(const Eigen::VectorXd& u, const Eigen::VectorXd& input, Eigen::VectorXd& out) {
     push_force(arm_, u, input, force_);
     spring_force(arm_, u, spring_);
-    inverse_dynamics(plain_, workspace_, u, u, u, u,
-                     {.inertia = false, .coriolis = false, .gravity = true}, out);
+    gravity_moments(plain_, workspace_, u, out);
     out += spring_ - force_;
   }
 
-  bool settle(const Eigen::VectorXd& input, Eigen::VectorXd& u) {
-    const Eigen::Index dof = u.size();
-    Eigen::VectorXd residual(dof), moved(dof), shifted(dof);
-    Eigen::MatrixXd jacobian(dof, dof);
-    u = arm_.rest_rad;
-    for (int round = 0; round < 60; ++round) {
-      imbalance(u, input, residual);
-      for (Eigen::Index j = 0; j < dof; ++j) {
-        moved = u;
-        moved[j] += 1e-6;
-        imbalance(moved, input, shifted);
-        jacobian.col(j) = (shifted - residual) / 1e-6;
-      }
-      Eigen::VectorXd step = jacobian.partialPivLu().solve(residual);
-      if (!step.allFinite()) return false;
-      const double length = step.norm();
-      if (length > 0.5) step *= 0.5 / length;
-      u -= step;
-      if (length < 1e-12) return true;
-    }
-    return false;
+  /// The shape at rest under an input.
+  std::optional<Eigen::VectorXd> settled(const Eigen::VectorXd& input) {
+    return solve_balance(
+        [&](const Eigen::VectorXd& u, Eigen::VectorXd& left) { imbalance(u, input, left); },
+        arm_.rest_rad);
   }
 
   /// One step of length h; inputs at its begin, middle and end.
-  bool step(double h, const Eigen::VectorXd& p0, const Eigen::VectorXd& p1,
-            const Eigen::VectorXd& p2, Eigen::VectorXd& u, Eigen::VectorXd& v) {
+  [[nodiscard]] bool step(double h, const Eigen::VectorXd& p0, const Eigen::VectorXd& p1,
+                          const Eigen::VectorXd& p2, Eigen::VectorXd& u, Eigen::VectorXd& v) {
     if (!arm_.inertia) return creep(h, p0, p1, p2, u);
     if (!acceleration(u, v, p0, a1_)) return false;
     u2_ = u + 0.5 * h * v;
@@ -111,8 +90,8 @@ class Motion {
   }
 
   /// The same without inertia.
-  bool creep(double h, const Eigen::VectorXd& p0, const Eigen::VectorXd& p1,
-             const Eigen::VectorXd& p2, Eigen::VectorXd& u) {
+  [[nodiscard]] bool creep(double h, const Eigen::VectorXd& p0, const Eigen::VectorXd& p1,
+                           const Eigen::VectorXd& p2, Eigen::VectorXd& u) {
     velocity(u, p0, a1_);
     u2_ = u + 0.5 * h * a1_;
     velocity(u2_, p1, a2_);
@@ -199,15 +178,8 @@ double ResponseModel::fastest_1ps(const ArmHypothesis& arm) const {
   }
   const Eigen::VectorXd straight = Eigen::VectorXd::Zero(dof);
   if (!arm.inertia) {
-    Eigen::MatrixXd stiffness = springs.asDiagonal();
-    Eigen::VectorXd moved = straight, weight(dof);
-    for (Eigen::Index j = 0; j < dof; ++j) {
-      moved[j] = 1e-4;
-      inverse_dynamics(arm.arm, workspace, moved, moved, moved, moved,
-                       {.inertia = false, .coriolis = false, .gravity = true}, weight);
-      stiffness.col(j) += weight / 1e-4;
-      moved[j] = 0.0;
-    }
+    Eigen::MatrixXd stiffness = gravity_slope(arm.arm, straight);
+    stiffness.diagonal() += springs;
     const double largest = stiffness.cwiseAbs().rowwise().sum().maxCoeff();  // >= any eigenvalue
     return damping.minCoeff() > 0.0 ? largest / damping.minCoeff()
                                     : std::numeric_limits<double>::infinity();
@@ -244,9 +216,11 @@ bool ResponseModel::simulate(const ArmHypothesis& arm, double longest_step_s,
   LaggedInput input(record_.input, arm.lag_s, arm.delay_s);
   Motion motion(arm);
   motion.reserve(dof);
-  Eigen::VectorXd p0(arm.push.cols()), p1 = p0, p2 = p0, now(dof), v = Eigen::VectorXd::Zero(dof);
+  Eigen::VectorXd p0(arm.push.cols()), p1 = p0, p2 = p0, v = Eigen::VectorXd::Zero(dof);
   input.at(record_.time_s[0], p0);
-  if (!motion.settle(p0, now)) return false;
+  const std::optional<Eigen::VectorXd> settled = motion.settled(p0);
+  if (!settled) return false;
+  Eigen::VectorXd now = *settled;
   u.row(0) = now;
   for (Eigen::Index k = 1; k < frames; ++k) {
     const double from_s = record_.time_s[k - 1], span_s = record_.time_s[k] - from_s;

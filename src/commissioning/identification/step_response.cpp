@@ -5,6 +5,7 @@
 #include <numbers>
 #include <stdexcept>
 
+#include "softarm/base/time.hpp"
 #include "softarm/estimation/curvature_estimator.hpp"
 #include "softarm/simulation/arm_plant.hpp"
 #include "softarm/simulation/mocap_simulator.hpp"
@@ -91,7 +92,7 @@ MotionRecord record_step_response(const Experiment& experiment, const StepPlan& 
   CurvatureEstimate estimate;
   for (Eigen::Index k = 0; k < rows; ++k) {
     const std::int64_t now_ns = mocap.next_capture_ns();
-    const double now_s = 1e-9 * static_cast<double>(now_ns);
+    const double now_s = to_seconds(now_ns);
     plant.advance(now_s);
     plant.segment_ends(ends);
     mocap.capture(plant.base(), ends);

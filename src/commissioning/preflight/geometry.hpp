@@ -18,6 +18,10 @@ struct Poses {
 Poses poses_of(const Experiment& experiment, const Observation& seen,
                std::vector<BodyPose> SeenFrame::*poses);
 
+/// What the controller's estimator makes of mean poses, 2n, rad. False where it reads no bend, or
+/// where a body was not seen.
+bool curvature_of(const Experiment& experiment, const MeanPoses& poses, Eigen::VectorXd& u_rad);
+
 /// "base", "end of segment 2"
 std::string place(std::size_t body);
 

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "commissioning/preflight/geometry.hpp"
-#include "commissioning/preflight/statics.hpp"
+#include "softarm/model/statics.hpp"
 #include "softarm/transport/settings.hpp"
 
 namespace softarm {
@@ -105,7 +105,9 @@ Finding check_rest_pose(const Experiment& experiment, const MeanPoses& rest) {
     out.text = "not every segment seen";
     return out;
   }
-  const Eigen::VectorXd off_nm = static_force_nm(experiment.arm, u_rad);
+  DynamicsWorkspace workspace(experiment.arm);
+  Eigen::VectorXd off_nm(experiment.arm.dof());
+  static_moments(experiment.arm, workspace, u_rad, off_nm);
   std::vector<std::string> wrong;
   double bend_rad = 0.0, twist_rad = 0.0;
   for (std::size_t i = 0; i + 1 < rest.body.size(); ++i) {

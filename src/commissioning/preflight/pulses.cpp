@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "softarm/base/clock.hpp"
+#include "softarm/base/time.hpp"
 #include "softarm/commissioning/preflight/checks.hpp"
 #include "softarm/runtime/safety_monitor.hpp"
 
@@ -14,8 +15,6 @@ namespace {
 constexpr std::int64_t kLost_ns = 200'000'000;  ///< without a frame, or when the daemon would vent
 constexpr double kSoft_bar_per_s = 1.0;
 constexpr double kBefore_s = 0.2;  ///< at rest, to compare with
-
-std::int64_t to_ns(double time_s) { return static_cast<std::int64_t>(1e9 * time_s); }
 
 class Player {
  public:

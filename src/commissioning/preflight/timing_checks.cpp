@@ -5,6 +5,7 @@
 #include <limits>
 #include <optional>
 
+#include "softarm/base/time.hpp"
 #include "softarm/commissioning/preflight/checks.hpp"
 #include "softarm/runtime/safety_monitor.hpp"
 #include "softarm/runtime/settings.hpp"
@@ -36,7 +37,7 @@ Finding check_bodies(const Experiment& experiment, const Observation& seen) {
   Finding out{.check = kBodies};
   const LcmSettings& lcm = experiment.transport.lcm;
   const std::string channels = fmt::format("{}", fmt::join(seen.channels, ", "));
-  const double listened_s = 1e-9 * static_cast<double>(seen.rest_end_ns - seen.start_ns);
+  const double listened_s = to_seconds(seen.rest_end_ns - seen.start_ns);
   if (seen.frames.empty()) {
     out.verdict = Verdict::fail;
     out.text = fmt::format("no frame on {} within {:.1f} s", channels, listened_s);
@@ -48,8 +49,7 @@ Finding check_bodies(const Experiment& experiment, const Observation& seen) {
     return out;
   }
   const auto count = static_cast<int>(seen.frames.front().body.size());
-  const MeanPoses mean =
-      mean_poses(seen, seen.start_ns, std::numeric_limits<std::int64_t>::max(), count);
+  const MeanPoses mean = mean_poses(seen, seen.start_ns, kForever, count);
   std::vector<std::string> missing;
   for (std::size_t i = 0; i < mean.seen.size(); ++i)
     if (mean.seen[i] < kSeenEnough)
@@ -58,8 +58,7 @@ Finding check_bodies(const Experiment& experiment, const Observation& seen) {
                                                           body_name(i, experiment.transport),
                                                           100.0 * mean.seen[i]));
   out.text = fmt::format("{} frames in {:.1f} s on {}", seen.frames.size(),
-                         1e-9 * static_cast<double>(seen.frames.back().arrival_ns - seen.start_ns),
-                         channels);
+                         to_seconds(seen.frames.back().arrival_ns - seen.start_ns), channels);
   if (missing.empty()) {
     out.verdict = Verdict::pass;
     out.text += fmt::format(", all {} bodies seen", count);
@@ -93,7 +92,7 @@ Times times_of(const Observation& seen) {
     if (last != nullptr && frame.number <= last->number) continue;  // repeated or overtaken
     last = &frame;
     out.number.push_back(frame.number);
-    out.arrival_s.push_back(1e-9 * static_cast<double>(frame.arrival_ns - seen.start_ns));
+    out.arrival_s.push_back(to_seconds(frame.arrival_ns - seen.start_ns));
     out.s.push_back(
         out.stamped ? 1e-6 * static_cast<double>(frame.sender_us - seen.frames.front().sender_us)
                     : out.arrival_s.back());
@@ -138,8 +137,7 @@ Finding check_jitter(const Experiment& experiment, const Times& times) {
   Finding out{.check = "jitter"};
   const SafetySettings& safety = experiment.safety;
   const double hold_s =
-      1e-9 *
-      static_cast<double>(resolve_thresholds(safety, 1.0 / experiment.rate_hz).hold_after_ns);
+      to_seconds(resolve_thresholds(safety, 1.0 / experiment.rate_hz).hold_after_ns);
   double longest_s = 0.0, least_s = 1e300, most_s = -1e300;
   int late = 0;
   for (std::size_t k = 0; k < times.s.size(); ++k) {
@@ -165,12 +163,12 @@ Finding check_jitter(const Experiment& experiment, const Times& times) {
 
 /// Least time from stamp to arrival, if the stamps are of one of our clocks.
 std::optional<double> least_latency_s(const Observation& seen, std::string& clock) {
-  std::int64_t least_ns = INT64_MAX;
+  std::int64_t least_ns = kForever;
   for (const SeenFrame& frame : seen.frames)
     least_ns = std::min(least_ns, frame.arrival_ns - 1000 * frame.sender_us);
   for (const auto& [name, offset_ns] : {std::pair<const char*, std::int64_t>{"monotonic clock", 0},
                                         {"wall clock", seen.wall_minus_ns}}) {
-    const double latency_s = 1e-9 * static_cast<double>(least_ns + offset_ns);
+    const double latency_s = to_seconds(least_ns + offset_ns);
     if (latency_s < -1e-3 || latency_s > kLongestLatency_s) continue;
     clock = name;
     return latency_s;

@@ -6,8 +6,9 @@
 #include <cmath>
 #include <numbers>
 
-#include "commissioning/preflight/statics.hpp"
+#include "commissioning/preflight/geometry.hpp"
 #include "softarm/client/commander.hpp"
+#include "softarm/model/statics.hpp"
 
 namespace softarm {
 namespace {
@@ -39,7 +40,7 @@ std::string common_cause(const Responses& responses, std::string& cure) {
     return std::all_of(responses.begin(), responses.end(), holds);
   };
   if (all([](const PulseResponse& each) { return each.silent(); })) {
-    cure = "open the air supply; is the valve driver running, and not in DOUBT?";
+    cure = "open the air supply; is the valve driver running, and not DEGRADED?";
     return "no chamber moves the arm";
   }
   if (!all([](const PulseResponse& each) { return !each.silent() && !each.astray(); })) return "";
@@ -126,8 +127,11 @@ std::optional<PulseResponse> response_to(const Experiment& experiment, const Obs
                     before_rad) ||
       !curvature_of(experiment, mean_poses(seen, pulse.held_ns, pulse.end_ns, bodies), held_rad))
     return std::nullopt;
-  const Eigen::VectorXd moment_nm =
-      static_force_nm(experiment.arm, held_rad) - static_force_nm(experiment.arm, before_rad);
+  DynamicsWorkspace workspace(experiment.arm);
+  Eigen::VectorXd moment_nm(experiment.arm.dof()), before_nm(experiment.arm.dof());
+  static_moments(experiment.arm, workspace, held_rad, moment_nm);
+  static_moments(experiment.arm, workspace, before_rad, before_nm);
+  moment_nm -= before_nm;
   const Chamber& chamber = experiment.actuation.segments[static_cast<std::size_t>(pulse.segment)]
                                                         [static_cast<std::size_t>(pulse.chamber)];
   PulseResponse out{.pulse = pulse,

@@ -10,6 +10,7 @@
 #include "dev/fault/hostile_packets.hpp"
 #include "faults/softarmd/fault_test.hpp"
 #include "softarm/base/clock.hpp"
+#include "softarm/base/time.hpp"
 
 namespace softarm {
 namespace {
@@ -80,7 +81,7 @@ TEST_P(HostileBytes, MalformedPacketsWithoutEndAreRefusedWhileTheArmIsControlled
     // LCM's buffers grow to what they need first.
     if (memory_kb == 0 && sent > packets / 10) memory_kb = resident_kb(daemon->pid());
   }
-  const double passed_s = 1e-9 * static_cast<double>(monotonic_now_ns() - start_ns);
+  const double passed_s = to_seconds(monotonic_now_ns() - start_ns);
   EXPECT_TRUE(stays_active(*this)) << told() << daemon->printed();
   const int refused = status_.messages_malformed - before;
   const long grown_kb = resident_kb(daemon->pid()) - memory_kb;

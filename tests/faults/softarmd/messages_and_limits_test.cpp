@@ -7,6 +7,7 @@
 #include "dev/fault/raw_packets.hpp"
 #include "faults/softarmd/fault_test.hpp"
 #include "softarm/base/clock.hpp"
+#include "softarm/base/time.hpp"
 #include "softarm/transport/settings.hpp"
 
 namespace softarm {
@@ -45,7 +46,7 @@ TEST_P(MessagesAndLimits, HostileBytesAndAFloodAreCountedAndHarmless) {
   }
   EXPECT_TRUE(wait_for([&] { return status_.messages_malformed > before + 200; })) << told();
   EXPECT_TRUE(stays_active(*this)) << told() << daemon->printed();
-  const double passed_s = 1e-9 * static_cast<double>(monotonic_now_ns() - start_ns);
+  const double passed_s = to_seconds(monotonic_now_ns() - start_ns);
   EXPECT_TRUE(wait_for([&] { return count(daemon->printed(), "malformed") > 0; }));
   EXPECT_LE(count(daemon->printed(), "malformed"), 2.0 + passed_s) << "told once a second at most";
 

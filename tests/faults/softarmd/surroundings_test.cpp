@@ -67,7 +67,7 @@ TEST_P(Surroundings, AWallClockThatIsSetDisturbsNothing) {
       active_in_row_ = 0;
       undisturbed = wait_for([&] { return active_in_row_ >= 100; }, 2.0);
       EXPECT_TRUE(wait_for([&] { return status_.frames_accepted > accepted + 20; })) << told();
-      EXPECT_GT(clock.reads(), reads) << "LCM stamps what it receives with the wall clock";
+      EXPECT_GT(clock.reads(), reads) << "arrivals are stamped with the wall clock";
       EXPECT_TRUE(stays_active(*this, 10)) << told() << daemon->printed();
     }
     EXPECT_TRUE(undisturbed) << told() << daemon->printed();

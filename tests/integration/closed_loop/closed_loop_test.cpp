@@ -201,5 +201,28 @@ TEST(ClosedLoop, SilenceOfTheMotionCaptureHoldsThenVents) {
   EXPECT_LE(largest_step_bar, experiment.actuation.slew_bar_per_s * period_s * (1.0 + 1e-9));
 }
 
+// An operator arms what waits for it, holds the dead-man button, and looks first before arming an
+// arm that has vented.
+TEST(ClosedLoop, WithExplicitArmingItIsArmedOnce) {
+  Experiment experiment = configured("paper_arm.yaml");
+  experiment.safety.arming = Arming::explicit_;
+  experiment.safety.valve_readback = experiment.safety.deadman = true;
+  EXPECT_GT(track(experiment, 3.0, 1.0).active_s, 2.5);
+
+  experiment.plant.mocap.dropout_probability = 0.8;
+  experiment.safety.good_frames = 1;
+  experiment.safety.vent_after_s = 0.02;
+  int activations = 0;
+  bool waits_for_arm = false;
+  Mode mode = Mode::init;
+  track(experiment, 10.0, 0.0, [&](const LogRow& row) {
+    activations += row.mode == Mode::active && mode != Mode::active && mode != Mode::hold ? 1 : 0;
+    waits_for_arm |= row.mode == Mode::vent && row.reason == Reason::waiting_for_arm;
+    mode = row.mode;
+  });
+  EXPECT_EQ(activations, 1);
+  EXPECT_TRUE(waits_for_arm);
+}
+
 }  // namespace
 }  // namespace softarm

@@ -22,7 +22,7 @@ TEST_P(MocapSender, MakesTheDaemonActive) {
   write_config(GetParam(), "");
   const auto daemon = start("softarmd", {"--shadow"});
   ASSERT_TRUE(wait_for([&] { return mode() == Mode::wait_frames; })) << daemon->printed();
-  const auto sender = start("mocap_sender");
+  const auto sender = start("example_mocap_sender");
   ASSERT_TRUE(wait_for([&] { return mode() == Mode::active; }))
       << daemon->printed() << sender->printed() << told();
   EXPECT_GT(status_.frames_accepted, 0);

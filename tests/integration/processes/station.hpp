@@ -18,6 +18,7 @@
 #include "dev/soak/command_steps.hpp"
 #include "integration/processes/process.hpp"
 #include "softarm/base/clock.hpp"
+#include "softarm/base/time.hpp"
 #include "softarm/runtime/safety_monitor.hpp"
 #include "softarm/transport/lcm_node.hpp"
 #include "softarm/transport/message_decoding.hpp"
@@ -91,7 +92,7 @@ class Station {
 
   /// Handles messages until `reached`, or `patience_s` have passed; says which.
   bool wait_for(const std::function<bool()>& reached, double patience_s = 10.0) {
-    const std::int64_t end_ns = monotonic_now_ns() + static_cast<std::int64_t>(patience_s * 1e9);
+    const std::int64_t end_ns = monotonic_now_ns() + to_ns(patience_s);
     while (monotonic_now_ns() < end_ns) {
       if (reached()) return true;
       node_->wait_until(monotonic_now_ns() + kSecond / 100);

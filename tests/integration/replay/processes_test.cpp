@@ -10,6 +10,7 @@
 
 #include "integration/processes/process.hpp"
 #include "softarm/base/clock.hpp"
+#include "softarm/base/time.hpp"
 #include "softarm/config/load.hpp"
 #include "softarm/runtime/safety_monitor.hpp"
 #include "softarm/transport/event_log.hpp"
@@ -59,7 +60,7 @@ class ReplayOfProcesses : public ::testing::Test {
                                      folder_ / ("printed" + std::to_string(started_++)));
   }
   bool wait_for(const std::function<bool()>& reached, double patience_s = 20.0) {
-    const std::int64_t end_ns = monotonic_now_ns() + static_cast<std::int64_t>(patience_s * 1e9);
+    const std::int64_t end_ns = monotonic_now_ns() + to_ns(patience_s);
     while (monotonic_now_ns() < end_ns) {
       if (reached()) return true;
       node_->wait_until(monotonic_now_ns() + kSecond / 100);
@@ -86,7 +87,7 @@ class ReplayOfProcesses : public ::testing::Test {
     })) << logger->printed();
     const auto daemon = start("softarmd", {config_});
     ASSERT_TRUE(reach(Mode::active)) << daemon->printed();
-    const std::int64_t end_ns = monotonic_now_ns() + static_cast<std::int64_t>(1e9 * seconds);
+    const std::int64_t end_ns = monotonic_now_ns() + to_ns(seconds);
     do {
       go_on(0.3);
       daemon->signal(SIGSTOP);
@@ -101,6 +102,7 @@ class ReplayOfProcesses : public ::testing::Test {
       ASSERT_TRUE(reach(Mode::active)) << daemon->printed();
       plant->signal(SIGKILL);
       ASSERT_TRUE(reach(Mode::vent)) << daemon->printed();
+      plant->wait(10s);  // it holds its lock until it is gone
       plant = start("softarm-plant", {config_});
       ASSERT_TRUE(reach(Mode::active)) << daemon->printed() << plant->printed();
       ++rounds_;

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "softarm/base/time.hpp"
 #include "softarm/config/load.hpp"
 #include "softarm/simulation/simulated_arm.hpp"
 #include "softarm/transport/output_messages.hpp"
@@ -75,7 +76,7 @@ inline RecordedRun record_run(const Experiment& experiment, double seconds, bool
     return !bytes.empty();
   };
   const std::int64_t period_ns = pipeline.period_ns();
-  const auto ticks = static_cast<std::int64_t>(1e9 * seconds) / period_ns;
+  const auto ticks = to_ns(seconds) / period_ns;
   const SegmentVector zero = SegmentVector::Zero(experiment.arm.dof());
   const LiveReferenceInput reference{zero, zero, zero};
   for (std::int64_t k = 1; k <= ticks; ++k) {

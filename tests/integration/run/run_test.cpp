@@ -109,6 +109,30 @@ TEST_F(Run, LeavesWhatItPromises) {
   EXPECT_EQ(rows, 1500u);
 }
 
+// As softarmd with an operator beside it, and not for 20 s of WAIT_FRAMES and exit code 0.
+TEST_F(Run, WithExplicitArmingTheArmIsArmed) {
+  const std::string config =
+      write("explicit.yaml", "include: " + kPaperArm +
+                                 "\nname: explicit\ndaemon:\n  lcm: {deadman_channel: GO}\n"
+                                 "  safety: {arming: explicit, valve_readback: true}\n");
+  const std::string out = (folder / "out").string();
+  ASSERT_EQ(start("softarm", {"run", config, "--duration", "3", "--no-plots", "--out", out}), 0)
+      << printed;
+  EXPECT_GT(YAML::Load(read(folder / "out" / "summary.json"))["modes"]["ACTIVE"].as<double>(-1.0),
+            2.5);
+}
+
+TEST_F(Run, AnArmThatWasNeverActiveIsAFailureWithItsReason) {
+  const std::string out = (folder / "out").string();
+  EXPECT_EQ(start("softarm", {"run", kPaperArm, "--duration", "0.1", "--no-plots", "--out", out}),
+            1)
+      << printed;
+  for (const char* part :
+       {"never ACTIVE", "WAIT_FRAMES", "waiting_for_frames", "safety.good_frames"})
+    EXPECT_NE(printed.find(part), std::string::npos) << part << " in\n" << printed;
+  EXPECT_TRUE(std::filesystem::exists(folder / "out" / "summary.json"));
+}
+
 TEST_F(Run, WrongCommandLinesExitWith64) {
   const std::vector<std::vector<std::string>> wrong{
       {},
@@ -127,6 +151,39 @@ TEST_F(Run, WrongCommandLinesExitWith64) {
     EXPECT_EQ(start(program, {"--no-such-option"}), 64) << printed;
     EXPECT_NE(printed.find("--no-such-option"), std::string::npos) << printed;
     EXPECT_EQ(start(program, {kPaperArm, "--no-such-option"}), 64) << printed;
+  }
+}
+
+/// Every command of a program that has sub-commands, as its help lists them.
+std::vector<std::string> subcommands(const std::string& help) {
+  std::vector<std::string> names;
+  std::istringstream lines(help.substr(help.find("Subcommands:")));
+  for (std::string line, name; std::getline(lines, line);)
+    if (line.starts_with("  ") && !line.starts_with("   ") && std::istringstream(line) >> name)
+      names.push_back(name);
+  return names;
+}
+
+// A word that is misspelt is the likelier reason why something seems to be missing.
+TEST_F(Run, AnUnknownOptionIsNamedWhateverElseIsMissing) {
+  std::vector<std::vector<std::string>> commands{
+      {"softarmd"}, {"softarm-plant"}, {"softarm-valves"}, {"example_serial_pressure_board"}};
+  for (const char* program : {"softarm", "softarm-dev"}) {
+    commands.push_back({program});
+    ASSERT_EQ(start(program, {"--help"}), 0);
+    for (const std::string& name : subcommands(printed)) commands.push_back({program, name});
+  }
+  ASSERT_EQ(start("softarm-dev", {"bench", "--help"}), 0);
+  for (const std::string& name : subcommands(printed))
+    commands.push_back({"softarm-dev", "bench", name});
+  EXPECT_GT(commands.size(), 25u);
+  commands.push_back({"softarm", "check", "--pulse"});  // it requires --live
+  for (const std::vector<std::string>& command : commands) {
+    std::vector<std::string> arguments(command.begin() + 1, command.end());
+    arguments.emplace_back("--nope");
+    EXPECT_EQ(start(command.front(), arguments), 64) << command.back();
+    EXPECT_NE(printed.find("not expected: --nope"), std::string::npos)
+        << command.back() << ": " << printed;
   }
 }
 

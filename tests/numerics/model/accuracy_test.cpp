@@ -1,4 +1,4 @@
-// The accuracy reached per term, printed as the table of docs/accuracy.md:
+// The accuracy reached per term, printed as the table of docs/results/accuracy.md:
 //   numerics_model_tests --gtest_filter='Accuracy.*'
 #include <gtest/gtest.h>
 

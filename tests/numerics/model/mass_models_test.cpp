@@ -1,5 +1,5 @@
 // What the choice of mass model does to B and to the stiffness of the equations, in numbers: the
-// tables of docs/mass_models.md are what these tests print.
+// tables of docs/results/mass_models.md are what these tests print.
 #include <fmt/core.h>
 #include <gtest/gtest.h>
 

@@ -49,6 +49,47 @@ TEST(Template, IsUpToDate) {
       << "softarm check --template > config/template.yaml";
 }
 
+TEST(Schema, IsUpToDate) {
+  EXPECT_EQ(file_text(kConfigFolder / "experiment.schema.json"), schema_text())
+      << "softarm check --schema > config/experiment.schema.json";
+}
+
+/// The template documents what is derived where a key is left out or 0 (resolve_thresholds).
+TEST(Template, NamesEveryTermOfDerivedThresholds) {
+  const std::string text = std::regex_replace(template_text(), std::regex("\n *#"), "");
+  EXPECT_NE(text.find("max(3 T, 3 frame_period_s + frame_latency_s), T = 1/rate_hz"),
+            std::string::npos);
+  EXPECT_NE(text.find("max(0.1 s, 10 frame_period_s, 3 T)"), std::string::npos);
+}
+
+/// Without its line a key that is marked as required is missed, and no other.
+TEST(Template, MarksWhatIsRequired) {
+  std::vector<std::string> lines;
+  std::istringstream stream(template_text());
+  for (std::string line; std::getline(stream, line);) lines.push_back(line);
+  const auto is_comment = [](const std::string& line) {
+    return line.find_first_not_of(' ') == line.find('#') && !line.empty();
+  };
+  const TestFolder folder;
+  int required = 0;
+  for (std::size_t i = 1; i < lines.size(); ++i) {
+    const bool one_line =
+        lines[i].find(": ") != std::string::npos && lines[i].find("- ") == std::string::npos;
+    if (is_comment(lines[i]) || !one_line || !is_comment(lines[i - 1])) continue;
+    std::string without;
+    for (std::size_t j = 0; j < lines.size(); ++j) without += j == i ? "\n" : lines[j] + "\n";
+    bool missed = false;
+    try {
+      load_experiment(folder.write("e.yaml", without));
+    } catch (const ConfigError& error) {
+      missed = std::string(error.what()).find("missing") != std::string::npos;
+    }
+    EXPECT_EQ(missed, lines[i - 1].ends_with("required)")) << lines[i];
+    if (missed) ++required;
+  }
+  EXPECT_GE(required, 9);
+}
+
 /// Hints in the template are in force once their "# " is taken away.
 TEST(Template, HintsLoadWhenUncommented) {
   const std::string text = std::regex_replace(

@@ -50,6 +50,16 @@ TEST_F(ValvesKeys, ChoosingATerminalChoosesItsRegisters) {
   EXPECT_EQ(again.hash, first.hash);
 }
 
+// A program of one's own knows its own back ends, and what they need.
+TEST_F(ValvesKeys, AnotherBackEndNeedsNoRegisters) {
+  const Experiment board = load(
+      "valves: {backend: serial_board, device: /dev/ttyACM0, failsafe_timeout_s: 0.05, terminal: "
+      "free, host: not.used}\n");
+  EXPECT_EQ(board.valves.backend, "serial_board");
+  EXPECT_EQ(board.valves.device, "/dev/ttyACM0");
+  EXPECT_EQ(load("").valves.backend, "modbus");
+}
+
 TEST_F(ValvesKeys, LeftOutTheyHaveTheirDefaults) {
   const Experiment plain = load("");
   EXPECT_EQ(plain.valves.order, (std::vector<int>{0, 1, 2, 3, 4, 5}));
@@ -66,6 +76,8 @@ TEST_F(ValvesKeys, AnArmThatNoTerminalHoldsNeedsNone) {
 
 TEST_F(ValvesKeys, WhatCannotBeMeantIsRefused) {
   refuses("{host: terminal}", "valves.host");
+  refuses("{backend: ''}", "valves.backend");
+  refuses("{backend: serial_board, failsafe_timeout_s: 0.01}", "at least 0.015 s");
   refuses("{host: 300.0.0.1}", "an IPv4 address");
   refuses("{port: 0}", "[1, 65535]");
   refuses("{terminal: festo}", "one of cpx_vppm, cpx_vtem, cpx_e, cpx_ap, free");

@@ -82,7 +82,7 @@ struct Row {
 
 void PrintTo(const Row& row, std::ostream* out) { *out << name(row.reason) << name(row.mode); }
 
-/// Written from what the reaction must be (docs/faults.md), not from the table in the code.
+/// Written from what the reaction must be (docs/reference/faults.md), not from the table in the code.
 const std::vector<Row>& rows() {
   const auto nothing = [](Bench&) {};
   static const std::vector<Row> kRows{

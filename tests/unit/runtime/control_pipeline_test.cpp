@@ -4,7 +4,9 @@
 
 #include <gtest/gtest.h>
 
+#include <bit>
 #include <cstring>
+#include <vector>
 
 #include "softarm/runtime/settings.hpp"
 #include "unit/runtime/pipeline_bench.hpp"
@@ -330,6 +332,31 @@ TEST_F(LiveReferenceInPipeline, BeforeActiveAndInHoldItIsIgnored) {
   message.u.setConstant(1.0);
   bench.input.reference = &message;
   EXPECT_FALSE(bench.tick().reference_limited);
+}
+
+// No instant of the clock is a special one: a capture at zero is not "never".
+TEST_F(Pipeline, TheOriginOfTimeDoesNotMatter) {
+  const auto run_from = [&](std::int64_t start_ns) {
+    PipelineBench bench(experiment);
+    bench.now_ns = bench.next_capture_ns = start_ns;
+    bench.sent_ns = start_ns - 1000 * kMs;
+    std::vector<std::uint64_t> said;
+    const auto add = [&said](double value) { said.push_back(std::bit_cast<std::uint64_t>(value)); };
+    for (int k = 0; k < 700; ++k) {
+      bench.publishing = k < 400 || k > 500;  // HOLD, VENT and back
+      const TickOutput& output = bench.tick();
+      said.push_back(static_cast<std::uint64_t>(output.mode));
+      said.push_back(static_cast<std::uint64_t>(output.reason));
+      add(output.frame_age_s);
+      for (const double each : output.pressure_bar) add(each);
+      for (const double each : output.motion.u_rad) add(each);
+    }
+    return said;
+  };
+  const std::vector<std::uint64_t> expected = run_from(1000 * kMs);
+  // Whole periods of ticks and frames: zero is one of the captures.
+  for (const std::int64_t start_ns : {-10 * kMs, -500 * kMs, -820 * kMs, std::int64_t{0}})
+    EXPECT_TRUE(run_from(start_ns) == expected) << start_ns;
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <functional>
 #include <random>
 
+#include "softarm/base/time.hpp"
 #include "softarm/runtime/settings.hpp"
 
 namespace softarm {
@@ -298,7 +299,7 @@ TEST(SafetyMonitor, RandomSequencesNeverBreakTheInvariants) {
       const bool disarm = bench.input.disarm;
       const bool restarted = bench.input.sender_restarted;
       const Mode mode = bench.tick(chance(0.002) ? 200 * kMs : 2 * kMs);
-      const bool seen = bench.input.newest_capture_ns != SafetyInput::kNever;
+      const bool seen = bench.input.newest_capture_ns != kNever;
       const std::int64_t age =
           seen ? bench.input.now_ns - bench.input.newest_capture_ns : INT64_MAX;
       if (mode == Mode::active) {

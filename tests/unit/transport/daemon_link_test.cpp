@@ -10,6 +10,7 @@
 
 #include "counted_malloc.hpp"
 #include "softarm/base/clock.hpp"
+#include "softarm/base/time.hpp"
 #include "softarm/runtime/settings.hpp"
 #include "softarm/transport/message_decoding.hpp"
 #include "softarm/transport/settings.hpp"
@@ -143,7 +144,7 @@ TEST_F(DaemonLinkOverUdp, WhatWasDecidedBeforeTheValvesVentedIsNotSentAfterIt) {
   TickOutput output;
   output.pressure_bar = PressureVector::Constant(12, 0.5);
   std::int64_t now_ns = monotonic_now_ns();
-  const auto validity_ns = std::llround(1e9 * settings.safety.command_validity_s);
+  const auto validity_ns = to_ns(settings.safety.command_validity_s);
   const auto arrives = [&](int wanted) {
     for (int k = 0; count < wanted && k < 100; ++k)
       sender->wait_until(monotonic_now_ns() + 10'000'000);
@@ -224,9 +225,7 @@ TEST_F(DaemonLinkOverUdp, AGoIsHeardOnceANumberAndTakenBackAtOnce) {
     sender->publish(transport.lcm.deadman_channel,
                     deadman_t{.sequence = sequence, .go = static_cast<std::int8_t>(go)});
   };
-  const auto heard = [](const TickInput& input) {
-    return input.newest_go_ns != SafetyInput::kNever;
-  };
+  const auto heard = [](const TickInput& input) { return input.newest_go_ns != kNever; };
   say(1, true);
   ASSERT_TRUE(collect_until(heard));
   const std::int64_t first_ns = link->collect(monotonic_now_ns()).newest_go_ns;

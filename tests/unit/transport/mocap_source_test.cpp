@@ -223,6 +223,16 @@ TEST(MocapSource, HostileNumbersStayWithinBounds) {
     EXPECT_TRUE(frame.body[1].valid && std::isnan(frame.body[1].position_m.x()))
         << "the validator judges it";
   }
+  TransportSettings transport;
+  transport.bodies = {.base_id = -1, .segment_ids = {1, 2}};
+  MocapSource own(transport, {}, two_segments());
+  for (const std::int64_t time_us : {INT64_MAX, INT64_MIN, INT64_MIN + 1}) {
+    mocap_frame_t message{};
+    message.capture_time_us = time_us;
+    ASSERT_EQ(own.take(0, encoded(message), 1'000'000'000, frame), MocapReceipt::frame);
+    EXPECT_EQ(frame.capture_ns, 1'000'000'000);
+    EXPECT_LT(std::abs(own.sender_time_us() / 2), INT64_MAX / 1000 / 2) << "in ns it overflows";
+  }
   rigid_transform_t message{};
   for (const std::int64_t utime : {INT64_MAX, INT64_MIN, INT64_MIN + 1}) {
     message.utime = utime;

@@ -21,7 +21,6 @@ class Guard : public ::testing::Test {
   void SetUp() override { make(); }
   void make() {
     settings.chambers = 2;
-    settings.driver.registers = register_preset(TerminalKind::cpx_vppm);
     guard = std::make_unique<ValveGuard>(settings);
   }
 
@@ -174,10 +173,10 @@ TEST_F(Guard, AFewLateAnswersAreTolerated) {
 TEST_F(Guard, ExceptionRepliesAreAnsweredWithZeroThenWithANewConnection) {
   run();
   for (int k = 0; k < 3; ++k) cycle(LinkResult::exception_reply);
-  EXPECT_EQ(guard->state(), ValveState::doubt);
+  EXPECT_EQ(guard->state(), ValveState::degraded);
   EXPECT_EQ(cycle(LinkResult::exception_reply), ValveAction::exchange);
   EXPECT_TRUE(written.isZero()) << "zero is offered as long as it answers";
-  for (int k = 0; k < 250 && guard->state() == ValveState::doubt; ++k)
+  for (int k = 0; k < 250 && guard->state() == ValveState::degraded; ++k)
     cycle(LinkResult::exception_reply);
   EXPECT_EQ(guard->state(), ValveState::disconnected);
   EXPECT_TRUE(reach(ValveState::running));
@@ -226,12 +225,12 @@ TEST_F(Guard, AStuckValveIsFoundAndStaysVentedUntilSomeoneLooked) {
   EXPECT_TRUE(reach(ValveState::running));
 }
 
-TEST_F(Guard, AValveThatDoesNotCloseStaysInDoubt) {
+TEST_F(Guard, AValveThatDoesNotCloseStaysDegraded) {
   run();
   stuck_at = 1.7;
-  ASSERT_TRUE(reach(ValveState::doubt));
+  ASSERT_TRUE(reach(ValveState::degraded));
   for (int k = 0; k < 2000; ++k) cycle();
-  EXPECT_EQ(guard->state(), ValveState::doubt);
+  EXPECT_EQ(guard->state(), ValveState::degraded);
 }
 
 TEST_F(Guard, AStuckValveMayBeReportedOnly) {
@@ -248,14 +247,14 @@ TEST_F(Guard, ADiagnosisVentsAtOnceUntilItHasBeenAwayForAWhile) {
   run();
   read_back.diagnosis[1] = 4;
   cycle();
-  EXPECT_EQ(guard->state(), ValveState::doubt);
+  EXPECT_EQ(guard->state(), ValveState::degraded);
   EXPECT_EQ(guard->reason(), ValveReason::diagnosis);
   EXPECT_EQ(guard->chamber(), 1);
   cycle();
   EXPECT_TRUE(written.isZero());
   read_back.diagnosis[1] = 0;
   int cycles = 0;
-  while (guard->state() == ValveState::doubt) {
+  while (guard->state() == ValveState::degraded) {
     ++cycles;
     cycle();
   }
@@ -275,11 +274,41 @@ TEST_F(Guard, ATerminalThatIsNotReadyIsWaitedForAndGivenUp) {
   EXPECT_EQ(guard->reason(), ValveReason::not_ready);
 }
 
-TEST_F(Guard, AGapInTimeIsADoubt) {
+// Of a terminal that now and then does not answer, the starting takes as long as of any other.
+TEST_F(Guard, FailuresDoNotProlongTheWaitForATerminalThatIsNotReady) {
+  for (const LinkResult result : {LinkResult::no_answer, LinkResult::exception_reply}) {
+    make();
+    read_back.ready = false;
+    ASSERT_TRUE(reach(ValveState::starting));
+    const std::int64_t since = now;
+    for (int k = 0; k < 5000 && guard->state() == ValveState::starting; ++k)
+      cycle(k % 50 == 0 ? result : LinkResult::ok);
+    EXPECT_EQ(guard->state(), ValveState::disconnected);
+    EXPECT_EQ(guard->reason(), ValveReason::not_ready);
+    EXPECT_NEAR(static_cast<double>(now - since), 20'000.0 * kMs, 2 * kPeriod);
+  }
+}
+
+// Nor do failures of one kind that begin before the terminal is secured shorten it.
+TEST_F(Guard, FailuresWhileSecuringAreForgottenOnceItIsSecured) {
+  secure_result = LinkResult::no_answer;
+  ASSERT_TRUE(reach(ValveState::securing));
+  for (int k = 0; k < settings.driver.tolerated_failures; ++k) cycle();
+  ASSERT_EQ(guard->state(), ValveState::securing);
+  secure_result = LinkResult::ok;
+  cycle();
+  ASSERT_EQ(guard->state(), ValveState::starting);
+  for (int k = 0; k < settings.driver.tolerated_failures; ++k) {
+    cycle(LinkResult::no_answer);
+    EXPECT_EQ(guard->state(), ValveState::starting) << k;
+  }
+}
+
+TEST_F(Guard, AGapInTimeDegrades) {
   run();
   now += 300 * kMs;
   EXPECT_FALSE(guard->wake(now)) << "what waits in queues is too old";
-  EXPECT_EQ(guard->state(), ValveState::doubt);
+  EXPECT_EQ(guard->state(), ValveState::degraded);
   EXPECT_EQ(guard->reason(), ValveReason::time_gap);
   cycle();
   EXPECT_TRUE(written.isZero());
@@ -316,7 +345,7 @@ TEST_F(Guard, NoGapIsLongerThanTheTerminalsOwnTimeOut) {
   run();
   now += 16 * kMs;
   cycle();
-  EXPECT_EQ(guard->state(), ValveState::doubt);
+  EXPECT_EQ(guard->state(), ValveState::degraded);
   EXPECT_TRUE(written.isZero());
 }
 
@@ -328,7 +357,7 @@ TEST_F(Guard, WhereNoAnswerCameForTheTerminalsTimeOutItHasVented) {
   for (int k = 0; k < 39; ++k) cycle(LinkResult::no_answer);
   ASSERT_EQ(guard->state(), ValveState::running);
   cycle();
-  EXPECT_EQ(guard->state(), ValveState::doubt);
+  EXPECT_EQ(guard->state(), ValveState::degraded);
   EXPECT_EQ(guard->reason(), ValveReason::time_gap);
 }
 
@@ -341,7 +370,7 @@ TEST_F(Guard, WhatWasDecidedBeforeAGapIsNotWrittenAfterIt) {
   EXPECT_EQ(guard->reason(), ValveReason::time_gap);
 }
 
-TEST_F(Guard, WithExplicitArmingCommandsMustHaveBeenZeroAfterADoubt) {
+TEST_F(Guard, WithExplicitArmingCommandsMustHaveBeenZeroAfterDegraded) {
   settings.wait_for_zero = true;
   make();
   commanding = true;

@@ -7,6 +7,9 @@
 #include <cmath>
 #include <limits>
 
+#include "softarm/base/clock.hpp"
+#include "softarm/base/time.hpp"
+
 namespace softarm {
 namespace {
 
@@ -15,22 +18,11 @@ constexpr double kLongCall_ns = 2e6;
 constexpr int kMostCalls = 1 << 20;  ///< a slot, where a call takes no time at all
 constexpr std::size_t kMinimumRounds = 3;
 
-double now_ns() {
-  const auto now = std::chrono::steady_clock::now().time_since_epoch();
-  return static_cast<double>(std::chrono::duration_cast<std::chrono::nanoseconds>(now).count());
-}
-
-/// Of this thread: what others do on the same core does not count.
-double processor_time_ns() {
-  timespec time{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
-  return 1e9 * static_cast<double>(time.tv_sec) + static_cast<double>(time.tv_nsec);
-}
-
+/// Processor time of this thread: what others do on the same core does not count.
 double timed_ns(const std::function<void(int)>& run, int calls) {
-  const double start_ns = processor_time_ns();
+  const std::int64_t start_ns = thread_cpu_ns();
   run(calls);
-  return (processor_time_ns() - start_ns) / calls;
+  return static_cast<double>(thread_cpu_ns() - start_ns) / calls;
 }
 
 }  // namespace
@@ -68,8 +60,9 @@ void InterleavedTiming::measure(double seconds, const std::function<void(double)
     entry.call_ns.clear();
     calibrate(entry);
   }
-  const double start_ns = now_ns(), length_ns = 1e9 * seconds;
-  for (std::size_t round = 0; round < kMinimumRounds || now_ns() - start_ns < length_ns; ++round) {
+  const std::int64_t start_ns = monotonic_now_ns();
+  const auto passed_s = [&] { return to_seconds(monotonic_now_ns() - start_ns); };
+  for (std::size_t round = 0; round < kMinimumRounds || passed_s() < seconds; ++round) {
     for (Entry& entry : entries_) {
       const bool takes_part = round % static_cast<std::size_t>(entry.every) == 0;
       // The first calls fetch code and data that the others have driven out.
@@ -77,7 +70,7 @@ void InterleavedTiming::measure(double seconds, const std::function<void(double)
       entry.call_ns.push_back(takes_part ? timed_ns(entry.run, entry.calls)
                                          : std::numeric_limits<double>::quiet_NaN());
     }
-    progress(std::min(1.0, (now_ns() - start_ns) / length_ns));
+    progress(std::min(1.0, passed_s() / seconds));
   }
 }
 

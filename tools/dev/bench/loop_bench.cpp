@@ -24,6 +24,7 @@
 #include "dev/child_process.hpp"
 #include "softarm/base/clock.hpp"
 #include "softarm/base/realtime.hpp"
+#include "softarm/base/time.hpp"
 #include "softarm/config/load.hpp"
 #include "softarm/model/kinematics.hpp"
 #include "softarm/runtime/safety_monitor.hpp"
@@ -69,7 +70,7 @@ class Scene {
   Scene(const LoopBenchOptions& options, LoopScene& result)
       : options_(options),
         result_(result),
-        period_ns_(std::llround(1e9 / options.rate_hz)),
+        period_ns_(to_ns(1.0 / options.rate_hz)),
         folder_(std::filesystem::temp_directory_path() /
                 fmt::format("softarm_bench_loop_{}", getpid())) {
     std::filesystem::create_directories(folder_);
@@ -79,7 +80,7 @@ class Scene {
         "  lcm: {{url: \"udpm://239.255.76.67:{}?ttl=0\"}}\n"
         "  safety: {{arming: automatic, frame_period_s: 0.01, frame_latency_s: 0, hold_after_s: "
         "1,\n"
-        "    vent_after_s: 2, hold_overruns: 1000000, vent_overruns: 1000000, valve_readback: "
+        "    vent_after_s: 2, hold_overruns: 999999, vent_overruns: 1000000, valve_readback: "
         "false}}\n"
         "  realtime: {{fifo: {}, priority: {}, cpu: {}}}\n",
         std::filesystem::absolute(options.config).string(), kTheta_rad, options.rate_hz,
@@ -193,7 +194,7 @@ void Scene::listen() {
 }
 
 bool Scene::wait_for(const std::function<bool()>& reached) {
-  const std::int64_t end_ns = monotonic_now_ns() + static_cast<std::int64_t>(1e9 * kPatience_s);
+  const std::int64_t end_ns = monotonic_now_ns() + to_ns(kPatience_s);
   while (!reached() && monotonic_now_ns() < end_ns) drive(0.05, [](const std::string&) {});
   return reached();
 }
@@ -201,7 +202,7 @@ bool Scene::wait_for(const std::function<bool()>& reached) {
 /// A frame to the daemon, a request to the echo, in turn, at random times.
 void Scene::drive(double seconds, const std::function<void(const std::string&)>& progress) {
   const std::int64_t start_ns = monotonic_now_ns();
-  const std::int64_t end_ns = start_ns + static_cast<std::int64_t>(1e9 * seconds);
+  const std::int64_t end_ns = start_ns + to_ns(seconds);
   std::uniform_int_distribution<std::int64_t> pause_ns(2'000'000, 4'000'000);
   for (std::int64_t next_ns = start_ns; next_ns < end_ns; next_ns += pause_ns(random_)) {
     while (monotonic_now_ns() < next_ns) node_->wait_until(next_ns);
@@ -215,8 +216,8 @@ void Scene::drive(double seconds, const std::function<void(const std::string&)>&
     sent_ns.push_back(now_ns);
     frame.capture_time_us = now_ns / 1000;
     node_->publish(to_echo ? kEchoRequest : experiment_.transport.lcm.mocap_channel, frame);
-    progress(fmt::format("{}: {:.0f} / {:.0f} s", result_.name,
-                         1e-9 * static_cast<double>(now_ns - start_ns), seconds));
+    progress(
+        fmt::format("{}: {:.0f} / {:.0f} s", result_.name, to_seconds(now_ns - start_ns), seconds));
   }
 }
 

@@ -7,6 +7,8 @@
 #include <numbers>
 
 #include "dev/bench/plain_cvode.hpp"
+#include "softarm/base/clock.hpp"
+#include "softarm/base/time.hpp"
 #include "softarm/simulation/plant_error.hpp"
 
 namespace softarm {
@@ -14,12 +16,6 @@ namespace {
 
 constexpr double kHold_s = 1e-3;
 constexpr int kHoldsPerSample = 20;
-
-double processor_time_s() {
-  timespec time{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
-  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
-}
 
 /// A plant under the smooth drive or under a force held.
 class DrivenSystem final : public SecondOrderSystem {
@@ -139,10 +135,10 @@ PlantRun run_plant(const PlantSettings& settings, Scene scene, const Trial& tria
   try {
     if (trial.plain_cvode) {
       PlainCvode solver(system, trial.tolerance, absolute, scene != Scene::held);
-      const double start_s = processor_time_s();
+      const double start_s = to_seconds(thread_cpu_ns());
       solver.reset(0.0, x, rest);
       drive_through(solver, system, settings, scene, duration_s, run.samples);
-      run.seconds = processor_time_s() - start_s;
+      run.seconds = to_seconds(thread_cpu_ns()) - start_s;
       return run;
     }
     const auto solver =
@@ -152,10 +148,10 @@ PlantRun run_plant(const PlantSettings& settings, Scene scene, const Trial& tria
                                  .absolute_tolerance_velocity = kVelocityTolerance * absolute,
                                  .max_step_s = trial.max_step_s,
                                  .smooth_input = scene != Scene::held});
-    const double start_s = processor_time_s();
+    const double start_s = to_seconds(thread_cpu_ns());
     solver->reset(0.0, x, rest);
     drive_through(*solver, system, settings, scene, duration_s, run.samples);
-    run.seconds = processor_time_s() - start_s;
+    run.seconds = to_seconds(thread_cpu_ns()) - start_s;
     run.counters = solver->counters();
   } catch (const PlantError& error) {
     run.failure = error.cause;

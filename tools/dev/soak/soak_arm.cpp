@@ -7,6 +7,7 @@
 #include <softarm_messages/operator_command_t.hpp>
 
 #include "softarm/base/clock.hpp"
+#include "softarm/base/time.hpp"
 #include "softarm/transport/message_decoding.hpp"
 
 namespace softarm {
@@ -109,7 +110,7 @@ void SoakArm::take_command(const ReceivedMessage& packet) {
 }
 
 bool SoakArm::wait_for(const std::function<bool()>& reached, double patience_s) {
-  const std::int64_t end_ns = monotonic_now_ns() + static_cast<std::int64_t>(1e9 * patience_s);
+  const std::int64_t end_ns = monotonic_now_ns() + to_ns(patience_s);
   for (std::int64_t now_ns = monotonic_now_ns(); now_ns < end_ns; now_ns = monotonic_now_ns()) {
     if (reached()) return true;
     speak(now_ns);
@@ -148,12 +149,12 @@ void SoakArm::begin_motion() {
       random_reference(segments_, std::min(kMostTheta_rad, 0.5 * control_.max_theta_rad), kPoses,
                        ++seed_),
       control_, segments_);
-  reference_->start(1e-9 * static_cast<double>(monotonic_now_ns()), u, rest);
+  reference_->start(to_seconds(monotonic_now_ns()), u, rest);
 }
 
 void SoakArm::publish_reference(std::int64_t now_ns) {
   if (!reference_) return;
-  reference_->sample(1e-9 * static_cast<double>(now_ns), sample_);
+  reference_->sample(to_seconds(now_ns), sample_);
   const auto list = [](const SegmentVector& from) {
     return std::vector<double>(from.begin(), from.end());
   };

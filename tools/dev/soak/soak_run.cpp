@@ -11,6 +11,7 @@
 #include "apps/progress.hpp"
 #include "apps/signals.hpp"
 #include "softarm/base/clock.hpp"
+#include "softarm/base/time.hpp"
 #include "softarm/config/load.hpp"
 #include "softarm/transport/settings.hpp"
 
@@ -66,9 +67,7 @@ SoakRun::SoakRun(const SoakOptions& options)
   for (const SoakFault& fault : soak_faults()) counters_.faults.push_back({.name = fault.name});
 }
 
-double SoakRun::passed_s() const {
-  return 1e-9 * static_cast<double>(monotonic_now_ns() - start_ns_);
-}
+double SoakRun::passed_s() const { return to_seconds(monotonic_now_ns() - start_ns_); }
 
 void SoakRun::start(Program& program) {
   const int number = program.process ? ++program.record.instances : 1;

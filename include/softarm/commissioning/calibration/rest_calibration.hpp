@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "commissioning/calibration/pose_statistics.hpp"
 #include "softarm/config/experiment.hpp"
 #include "softarm/estimation/mocap_frame.hpp"
+#include "softarm/estimation/pose_statistics.hpp"
 #include "softarm/transport/settings.hpp"
 
 namespace softarm {
@@ -35,10 +35,6 @@ struct RestCalibration {
   /// The second half of the frames with the plates that the first half alone gives.
   std::vector<RestReading> after;
 };
-
-/// u at rest: K u + G(u) = 0, nearest to straight.
-/// @throws std::runtime_error where Newton's method finds none
-Eigen::VectorXd rest_shape(const ArmParameters& arm);
 
 /// With B_i the mean pose of body i and T_i(u) the pose of S_i in S_0:
 ///   plate_i = B_i^-1 S_0 T_i(u_rest).

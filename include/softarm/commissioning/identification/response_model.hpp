@@ -50,7 +50,8 @@ class ResponseModel {
 
   /// u at every frame, in rows, from the static equilibrium under the first input. False where the
   /// response grows without bound or there is no equilibrium.
-  bool simulate(const ArmHypothesis& arm, double longest_step_s, Eigen::MatrixXd& u) const;
+  [[nodiscard]] bool simulate(const ArmHypothesis& arm, double longest_step_s,
+                              Eigen::MatrixXd& u) const;
 
  private:
   double fastest_1ps(const ArmHypothesis& arm) const;

@@ -24,8 +24,8 @@ struct MeanPoses {
   std::vector<double> seen;    ///< parts of the frames
   int frames = 0;
 };
-/// Over the frames that arrived within [from_ns, to_ns), positions averaged and quaternions
-/// averaged after bringing their signs together. `bodies` is n + 1.
+/// Over the frames that arrived within [from_ns, to_ns), by MeanPose; an orientation has the mean
+/// length of its quaternions. `bodies` is n + 1.
 MeanPoses mean_poses(const Observation& seen, std::int64_t from_ns, std::int64_t to_ns, int bodies,
                      std::vector<BodyPose> SeenFrame::*poses = &SeenFrame::body);
 

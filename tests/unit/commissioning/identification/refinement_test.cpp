@@ -195,6 +195,34 @@ TEST(Refinement, WithoutGravitySlowMotionTellsRatiosOnly) {
   EXPECT_GT(std::abs(fit.combinations.col(2).dot(Eigen::Vector3d::Ones().normalized())), 0.98);
 }
 
+// The longest step is judged straight and at rest; bent by several radians a lightly damped arm
+// needs a shorter one, and has a bounded response all the same.
+TEST(Refinement, AnArmBentFarIsSimulatedWithShorterSteps) {
+  Experiment experiment = one_segment();
+  experiment.arm.gravity_mps2.setZero();
+  experiment.arm.segments[0].damping_nms_per_rad = 0.001;
+  FitChoice choice;
+  choice.gains = GainSharing::arm;
+  choice.lag = choice.delay = false;
+  MotionRecord record;
+  record.time_s = Eigen::VectorXd::LinSpaced(200, 0.0, 199 * 0.05);
+  record.input.time_s = Eigen::Vector2d(0.0, 1.0);
+  record.input.value.setZero(2, 4);
+  record.input.value(1, 0) = 3.0;
+  const ResponseModel model(record);
+  const ArmHypothesis truth = believed(experiment);
+  const double longest_s = model.longest_step_s(truth);
+  ASSERT_FALSE(model.simulate(truth, longest_s, record.u_rad));
+  ASSERT_TRUE(model.simulate(truth, 0.25 * longest_s, record.u_rad));
+
+  const ParameterSet set(truth, ActuationKind::chambers, choice);
+  for (const Refinement& fit :
+       {refine(set, record, set.believed(), {}), predict(set, record, set.believed())}) {
+    ASSERT_EQ(fit.residual_rad.rows(), record.u_rad.rows());
+    EXPECT_LT(fit.rms_rad, 0.2 * fit.motion_rms_rad);
+  }
+}
+
 TEST(Refinement, RefusesWhatCannotBeSimulated) {
   Experiment experiment = one_segment();
   const MotionRecord record = test::plant_record(experiment, 1, 0.2, 0.2, 200.0);
@@ -203,6 +231,20 @@ TEST(Refinement, RefusesWhatCannotBeSimulated) {
   experiment.actuation.segments.assign(3, experiment.actuation.segments[0]);
   const ArmHypothesis arm = believed(experiment);
   EXPECT_THROW(ResponseModel(record).longest_step_s(arm), std::runtime_error);
+}
+
+/// Without inertia the fastest mode is (k + G_u) / beta; the weight of an arm that stands out
+/// sideways, which is there without a bend, is no part of it.
+TEST(Refinement, TheStepOfAQuasiStaticArmIsThatOfItsStiffnessHoweverItIsMounted) {
+  Experiment experiment = one_segment();
+  const MotionRecord record = test::plant_record(experiment, 1, 0.2, 0.2, 200.0);
+  experiment.arm.base_rotation =
+      Eigen::AngleAxisd(M_PI / 2, Eigen::Vector3d::UnitY()).toRotationMatrix();
+  ArmHypothesis arm = believed(experiment);
+  arm.inertia = false;
+  const SegmentParameters& segment = experiment.arm.segments[0];
+  const double modes_s = segment.damping_nms_per_rad / segment.stiffness_nm_per_rad;
+  EXPECT_NEAR(ResponseModel(record).longest_step_s(arm), 2.0 * modes_s, 0.1 * modes_s);
 }
 
 }  // namespace

@@ -1,0 +1,52 @@
+// The valve driver's side of LCM: commands in, measured pressures and status out.
+#pragma once
+
+#include <cstdint>
+#include <softarm_messages/pressure_command_t.hpp>
+#include <softarm_messages/pressure_measurement_t.hpp>
+#include <softarm_messages/valves_status_t.hpp>
+#include <vector>
+
+#include "softarm/transport/lcm_node.hpp"
+#include "softarm/transport/settings.hpp"
+#include "softarm/valves/valve_driver.hpp"
+
+namespace softarm {
+
+/// Belongs to the driver's thread. After construction nothing allocates or throws.
+class ValvesLink {
+ public:
+  /// Commands go to `driver`, which must outlive this. @throws TransportError
+  ValvesLink(const LcmSettings& lcm, ValveDriver& driver);
+
+  /// Takes commands as they come until `deadline_ns` of CLOCK_MONOTONIC, so that their validity
+  /// counts from their arrival.
+  void take_until(std::int64_t deadline_ns) noexcept;
+  /// Empties the queue of commands: takes them, or throws them away.
+  void drain(bool take) noexcept;
+
+  /// The pressures that the driver has just read back.
+  void publish_measurement(std::int64_t now_ns) noexcept;
+  /// State and counters where state, reason or chamber have changed, and ten times a second. True
+  /// after a change.
+  bool publish_status(std::int64_t now_ns, std::int64_t late_cycles) noexcept;
+
+  /// Commands that were malformed, or of another arm.
+  std::int64_t refused() const noexcept { return refused_; }
+
+ private:
+  void take(const ReceivedMessage& packet) noexcept;
+
+  LcmSettings lcm_;
+  ValveDriver& driver_;
+  LcmNode node_;
+  std::vector<double> pressure_bar_;
+  bool discarding_ = false;
+  std::int64_t refused_ = 0;
+  std::int64_t next_status_ns_ = 0;
+  softarm_messages::pressure_command_t command_{};
+  softarm_messages::pressure_measurement_t measurement_{};
+  softarm_messages::valves_status_t status_{};
+};
+
+}  // namespace softarm

@@ -1,0 +1,40 @@
+// A valve terminal on Modbus TCP as a back end: pressures to words and requests, and back.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "softarm/valves/modbus_terminal.hpp"
+#include "softarm/valves/valve_backend.hpp"
+
+namespace softarm {
+
+/// One block write a cycle and one block read, by the register map of the settings.
+class ModbusBackend : public ValveBackend {
+ public:
+  /// @throws std::invalid_argument for a host that is no IPv4 address
+  ModbusBackend(const ValveDriverSettings& settings, double max_pressure_bar);
+
+  bool connect() noexcept override;
+  void close() noexcept override { terminal_.close(); }
+  bool is_open() const noexcept override { return terminal_.is_open(); }
+  Secured secure() noexcept override;
+  LinkResult write(const Eigen::VectorXd& set_points_bar) noexcept override;
+  LinkResult read(ReadBack& read_back) noexcept override;
+  const char* error() const noexcept override;
+  /// "HOST:PORT unit ID"
+  std::string address() const override;
+  /// That the registers were not tried on hardware, unless the terminal is on this machine.
+  std::string warning() const override;
+
+ private:
+  ValveDriverSettings settings_;
+  double max_pressure_bar_;
+  ModbusTerminal terminal_;
+  std::vector<std::uint16_t> out_, in_;
+  std::array<char, 200> refusal_{};  ///< of the time-out; "": the terminal's own error counts
+};
+
+}  // namespace softarm

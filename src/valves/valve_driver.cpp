@@ -1,0 +1,123 @@
+#include "softarm/valves/valve_driver.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstring>
+#include <utility>
+
+namespace softarm {
+namespace {
+
+constexpr std::int64_t kMostStopping_ns = 700'000'000;
+
+bool is_finite(const ReadBack& read_back, Eigen::Index chambers) noexcept {
+  return read_back.actual_bar.size() == chambers && read_back.actual_bar.allFinite() &&
+         (!read_back.has_echo ||
+          (read_back.echo_bar.size() == chambers && read_back.echo_bar.allFinite())) &&
+         read_back.diagnosis.size() == static_cast<std::size_t>(chambers);
+}
+
+}  // namespace
+
+ValveDriver::ValveDriver(const ValveGuardSettings& settings, std::unique_ptr<ValveBackend> backend,
+                         std::function<std::int64_t()> clock)
+    : backend_(std::move(backend)),
+      clock_(std::move(clock)),
+      order_(settings.driver.order),
+      address_(backend_->address()),
+      guard_(settings),
+      read_back_(settings.chambers),
+      newest_(settings.chambers),
+      written_bar_(Eigen::VectorXd::Zero(settings.chambers)),
+      zero_(written_bar_) {
+  order_.resize(static_cast<std::size_t>(settings.chambers));
+}
+
+bool ValveDriver::cycle(std::int64_t now_ns) noexcept {
+  bool measured = false;
+  switch (guard_.next(now_ns)) {
+    case ValveAction::wait:
+      break;
+    case ValveAction::connect: {
+      const bool connected = backend_->connect();
+      if (!connected) keep_error();
+      guard_.connected(connected, clock_());
+      break;
+    }
+    case ValveAction::secure: {
+      const auto [result, confirmed] = backend_->secure();
+      if (!confirmed) keep_error();
+      guard_.secured(result, confirmed, now_ns);
+      break;
+    }
+    case ValveAction::exchange:
+      // Held up since it was decided, it may come to hardware that has vented by itself.
+      guard_.wake(clock_());
+      measured = exchange(now_ns);
+      break;
+  }
+  if (guard_.state() == ValveState::disconnected && backend_->is_open()) {
+    // Should it still listen, it vents at once, not by its time-out.
+    if (guard_.reason() != ValveReason::no_connection) backend_->write(zero_);
+    backend_->close();
+  }
+  return measured;
+}
+
+bool ValveDriver::exchange(std::int64_t now_ns) noexcept {
+  written_bar_ = guard_.set_points_bar();
+  sequence_ = guard_.sequence();
+  LinkResult result = backend_->write(written_bar_);
+  if (result == LinkResult::ok) result = backend_->read(newest_);
+  if (result != LinkResult::ok) {
+    keep_error();
+  } else if (!is_finite(newest_, zero_.size())) {
+    result = LinkResult::no_answer;
+    std::strcpy(error_.data(), "pressures that are no numbers");
+  }
+  guard_.exchanged(result, newest_, now_ns);
+  if (result != LinkResult::ok) return false;
+  std::swap(read_back_, newest_);
+  exchanged_since_stop_ = stopping_;
+  return true;
+}
+
+void ValveDriver::keep_error() noexcept {
+  std::strncpy(error_.data(), backend_->error(), error_.size() - 1);
+}
+
+void ValveDriver::stop(std::int64_t now_ns) noexcept {
+  stopping_ = true;
+  stop_ns_ = now_ns;
+  guard_.stop();
+}
+
+bool ValveDriver::stopped(std::int64_t now_ns) const noexcept {
+  if (!stopping_) return false;
+  return (exchanged_since_stop_ && guard_.zero_confirmed()) ||
+         guard_.state() == ValveState::disconnected || now_ns - stop_ns_ >= kMostStopping_ns;
+}
+
+std::string_view ValveDriver::text(std::span<char> buffer) const noexcept {
+  const auto put = [&](auto format, const auto&... arguments) {
+    const auto end = fmt::format_to_n(buffer.data(), buffer.size(), format, arguments...);
+    return std::string_view(buffer.data(), std::min(end.size, buffer.size()));
+  };
+  const ValveReason reason = guard_.reason();
+  const char* state = name(guard_.state());
+  const char* open = reason == ValveReason::none ? "" : " (";
+  const char* close = reason == ValveReason::none ? "" : ")";
+  if (reason == ValveReason::failsafe_refused)
+    return put(FMT_STRING("{} ({}: {}); no pressure is written"), state, name(reason),
+               error_.data());
+  if (const int chamber = guard_.chamber(); chamber >= 0)
+    return put(FMT_STRING("{}{}{}{}: chamber {} (valve {}) set to {:.3f} bar reads {:.3f} bar"),
+               state, open, name(reason), close, chamber, order_[static_cast<std::size_t>(chamber)],
+               written_bar_[chamber], read_back_.actual_bar[chamber]);
+  if (guard_.state() == ValveState::disconnected)
+    return put(FMT_STRING("{} ({}): {}: {}"), state, name(reason), address_, error_.data());
+  return put(FMT_STRING("{}{}{}{}"), state, open, name(reason), close);
+}
+
+}  // namespace softarm
