@@ -9,7 +9,7 @@ int main(int count, char** arguments) try {
   const softarm::Experiment experiment = softarm::load_experiment(arguments[1]);
   const softarm::MotionRecord record =
       softarm::read_log(experiment, arguments[2], softarm::LoggedInput::commanded).record;
-  const softarm::ParameterSet set(softarm::believed(experiment), experiment.actuation.kind, {});
+  const softarm::ParameterSet set(softarm::configured(experiment), experiment.actuation.kind, {});
   const softarm::Refinement fit = softarm::identify(set, record, {});
   for (Eigen::Index i = 0; i < set.size(); ++i)
     std::printf("%s: %.4g +- %.2g %s\n", set[i].name.c_str(), fit.x[i] * set[i].scale,

@@ -30,14 +30,16 @@ std::string in_quotes(const std::string& text) { return "\"" + text + "\""; }
 
 class Checks {
  public:
-  Checks(const Experiment& experiment, const Keys& keys) : experiment_(experiment), keys_(keys) {}
+  Checks(const Experiment& experiment, const ConfigKeys& keys)
+      : experiment_(experiment), keys_(keys) {}
 
   void run() const {
     check_rotation("arm.base.rotation", experiment_.arm.base_rotation);
     check_rotation("plant.arm.base.rotation", experiment_.plant.arm.base_rotation);
     check_rotation("daemon.mocap.axes", experiment_.transport.mocap.axes);
     check_radius("arm", experiment_.arm, false);
-    check_radius("plant.arm", experiment_.plant.arm, experiment_.plant.kind == PlantKind::links);
+    check_radius("plant.arm", experiment_.plant.arm,
+                 experiment_.plant.kind.get_if<LinkSettings>() != nullptr);
     check_actuation("actuation", experiment_.actuation);
     check_actuation("plant.actuation", experiment_.plant.actuation);
     check_same_chambers();
@@ -162,13 +164,13 @@ class Checks {
     const auto& phases = experiment_.reference.phases;
     for (std::size_t i = 0; i < phases.size(); ++i) {
       const std::string key = fmt::format("reference[{}]", i);
-      if (const auto* hold = std::get_if<SetPointReference>(&phases[i].kind)) {
+      if (const auto* hold = phases[i].kind.get_if<SetPointReference>()) {
         check_in_plane(key, hold->u_rad);
-      } else if (const auto* paper = std::get_if<PaperReference>(&phases[i].kind)) {
+      } else if (const auto* paper = phases[i].kind.get_if<PaperReference>()) {
         check_in_plane(key, {std::cos(paper->phi_centre_rad), std::sin(paper->phi_centre_rad)});
         require(paper->phi_amplitude_rad == 0.0, key,
                 "a reference in the plane of actuation.plane_rad", "one that leaves it");
-      } else if (const auto* way = std::get_if<WayPointReference>(&phases[i].kind)) {
+      } else if (const auto* way = phases[i].kind.get_if<WayPointReference>()) {
         for (std::size_t j = 0; j < way->points.size(); ++j)
           check_in_plane(fmt::format("{}.points[{}]", key, j), way->points[j].u_rad);
       }
@@ -250,8 +252,8 @@ class Checks {
       const std::string& name = transport.lcm.*it.channel;
       if (!name.empty()) check_channel(seen, fmt::format("daemon.lcm.{}", it.name), name, name);
     }
-    if (transport.mocap.source == MocapSourceKind::rigid_transform) {  // every body has its own
-      const auto check = [&](const char* key, const PlateSettings& body) {
+    if (transport.mocap.source.channel_per_body) {  // every body has its own
+      const auto check = [&](const char* key, const MarkerFrameSettings& body) {
         check_channel(seen, key, body.name, body_channel(transport.lcm, body));
       };
       const BodySettings& bodies = transport.bodies;
@@ -316,12 +318,12 @@ class Checks {
   }
 
   const Experiment& experiment_;
-  const Keys& keys_;
+  const ConfigKeys& keys_;
 };
 
 }  // namespace
 
-void check_consistency(const Experiment& experiment, const Keys& keys) {
+void check_consistency(const Experiment& experiment, const ConfigKeys& keys) {
   Checks(experiment, keys).run();
 }
 

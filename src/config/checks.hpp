@@ -1,12 +1,12 @@
 // Checks of consistency between keys.
 #pragma once
 
+#include "softarm/config/config_keys.hpp"
 #include "softarm/config/experiment.hpp"
-#include "softarm/config/keys.hpp"
 
 namespace softarm {
 
-/// @throws ConfigError at the key to change first.
-void check_consistency(const Experiment& experiment, const Keys& reader);
+/// @throws ConfigError at the key that is to be changed first.
+void check_consistency(const Experiment& experiment, const ConfigKeys& reader);
 
 }  // namespace softarm

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "softarm/config/config_keys.hpp"
 #include "softarm/config/experiment.hpp"
-#include "softarm/config/keys.hpp"
 
 namespace softarm {
 
@@ -29,8 +29,6 @@ void describe_plant(Keys& key, Experiment& experiment);
 /// Without required keys where the variables hold values of other sections.
 void describe_arm(Keys& key, ArmParameters& it, Presence presence);
 void describe_actuation(Keys& key, ActuationSettings& it, Presence presence);
-/// A curvature of every segment, as `theta_rad` and `phi_rad` or as `u_rad`.
-void describe_pose(Keys& key, std::vector<double>& u_rad, Presence presence);
 
 /// A channel of section lcm, with its minimum length in characters.
 struct ChannelKey {
@@ -40,13 +38,5 @@ struct ChannelKey {
   const char* doc;
 };
 extern const std::array<ChannelKey, 11> kChannelKeys;
-
-/// A kind of phase of the reference, and one with its defaults.
-struct PhaseKind {
-  const char* name;
-  ReferenceKind empty;
-};
-/// A function, not a constant: an experiment may be loaded before main.
-const std::array<PhaseKind, 7>& phase_kinds();
 
 }  // namespace softarm

@@ -1,106 +1,25 @@
 // The declarations of references and of softarmd.
-#include <cmath>
 #include <numeric>
 
 #include "config/describe.hpp"
 
 namespace softarm {
 
-void describe_pose(Keys& key, std::vector<double>& u_rad, Presence presence) {
-  const auto n = static_cast<std::size_t>(key.segments);
-  u_rad.resize(2 * n, 0.0);
-  const auto as_u = [&] {
-    key("u_rad", u_rad, from(-kTwoPi, kTwoPi).one_or_pairs(),
-        "[x, y] of every segment, u = theta [cos phi, sin phi]", presence);
-  };
-  key.either("u_rad", as_u, "theta_rad", [&] {
-    std::vector<double> theta(n), phi(n);
-    for (std::size_t i = 0; i < n; ++i) {
-      theta[i] = std::hypot(u_rad[2 * i], u_rad[2 * i + 1]);
-      phi[i] = theta[i] > 0.0 ? std::atan2(u_rad[2 * i + 1], u_rad[2 * i]) : 0.0;
-    }
-    key("theta_rad", theta, from(-kTwoPi, kTwoPi).one_or_each(),
-        "bend of all segments, or a list (or u_rad: [[x, y], ...])", presence);
-    key("phi_rad", phi, from(-100, 100).one_or_each(),
-        "direction of the bend of all segments, or a list");
-    for (std::size_t i = 0; i < n && key.reading(); ++i) {
-      // Adding zero makes a negative zero positive, so that what is printed reads back the same.
-      u_rad[2 * i] = theta[i] * std::cos(phi[i]) + 0.0;
-      u_rad[2 * i + 1] = theta[i] * std::sin(phi[i]) + 0.0;
-    }
-  });
-}
-
-static void describe(Keys& key, SetPointReference& it) { describe_pose(key, it.u_rad, kRequired); }
-
-static void describe(Keys& key, PaperReference& it) {
-  KEY(theta_rad, from(0, kTwoPi), "theta of every segment after the rise");
-  KEY(rise_s, above(0, 1e3), "time of the rise from theta = 0");
-  KEY(phi_centre_rad, from(-kTwoPi, kTwoPi),
-      "phi_i = centre + amplitude cos(rate t + (i - 1) step)");
-  KEY(phi_amplitude_rad, from(0, 100), "amplitude of phi");
-  KEY(rate_radps, from(0, 1e3), "rate of phi");
-  KEY(phase_step_rad, from(-kTwoPi, kTwoPi), "phase from segment to segment");
-}
-
-static void describe(Keys& key, WayPointReference& it) {
-  KEY(repeat, "start again after the last point, which then equals the first; left out: false");
-  const Key points = {"points", "at rest in each, minimum jerk between them", kRequired};
-  key.list(points, it.points, [&](WayPoint& point) {
-    key("time_s", point.time_s, from(0, kMany), "since the phase began, increasing", kRequired);
-    describe_pose(key, point.u_rad, kRequired);
-  });
-}
-
-static void describe(Keys& key, LiveReference& it) {
-  KEY(timeout_s, above(0, 1e3), "silence after which the last u is held at rest");
-}
-
-static void describe(Keys& key, TipPathReference& it) {
-  const Form place = from(-1e3, 1e3);
-  KEY(centre_m, place, "of the path, in the world; left out, this and what follows are (22)");
-  if (it.shape == TipPathShape::point) return;
-  KEY(first_axis_m, place, "times cos(rate t)");
-  KEY(second_axis_m, place, "times sin(rate t), in a lemniscate sin(2 rate t)");
-  KEY(rate_radps, from(0, 1e3), "of the path");
-}
-
-const std::array<PhaseKind, 7>& phase_kinds() {
-  static const std::array<PhaseKind, 7> kinds = {{
-      {"set_point", SetPointReference{}},
-      {"paper", PaperReference{}},
-      {"way_points", WayPointReference{}},
-      {"live", LiveReference{}},
-      {"tip_point", TipPathReference{.shape = TipPathShape::point}},
-      {"tip_circle", TipPathReference{.shape = TipPathShape::circle}},
-      {"tip_lemniscate", TipPathReference{.shape = TipPathShape::lemniscate}},
-  }};
-  return kinds;
-}
-
-/// Index of the kind of a phase.
-static int kind_of(const ReferenceKind& kind) {
-  const auto* path = std::get_if<TipPathReference>(&kind);
-  return static_cast<int>(kind.index()) + (path ? static_cast<int>(path->shape) : 0);
-}
-
 void describe_reference(Keys& key, ReferenceSettings& it) {
-  const auto& kinds = phase_kinds();
-  std::vector<const char*> names(kinds.size());
-  for (std::size_t i = 0; i < names.size(); ++i) names[i] = kinds[i].name;
+  const auto names = reference_kinds().names();
   const Key list = {"reference", "phases one after the other; time starts at ACTIVE", kRequired};
   key.list(list, it.phases, [&](ReferencePhase& phase) {
-    int kind = kind_of(phase.kind);
+    std::size_t kind = reference_kinds().index(phase.kind.name());
     key("kind", kind, one_of(names),
         "set_point: hold; paper: (24); way_points; live: what comes over LCM; tip_...: a path of "
         "the tip by (21), tip_lemniscate: (22)",
         kRequired);
-    if (key.reading()) phase.kind = kinds[static_cast<std::size_t>(kind)].empty;
+    if (key.reading()) phase.kind = reference_kinds().all()[kind];
     key.when(&phase != &it.phases.back(), [&] {
       key("duration_s", phase.duration_s, above(0, kMany),
           "of the phase; the last one lasts for ever and has none", kRequired);
     });
-    std::visit([&](auto& reference) { describe(key, reference); }, phase.kind);
+    phase.kind.describe(key);
   });
 }
 
@@ -137,14 +56,15 @@ static void describe_mocap(Keys& key, TransportSettings& transport) {
   const std::vector<double> z_up = {1, 0, 0, 0, 1, 0, 0, 0, 1};
   const std::vector<double> y_up = {1, 0, 0, 0, 0, -1, 0, 1, 0};
   MocapSourceSettings& it = transport.mocap;
-  KEY(source, one_of({"softarm", "optitrack", "rigid_transform"}),
+  const auto names = mocap_sources().names();
+  std::size_t source = mocap_sources().index(it.source.name());
+  key("source", source, one_of(names),
       "softarm: mocap_frame_t; optitrack: optitrack_frame_t; rigid_transform: rigid_transform_t "
       "(Vicon), one channel a body");
   if (key.reading()) {
-    const bool optitrack = it.source == MocapSourceKind::optitrack;
-    it.quaternion = optitrack ? QuaternionOrder::xyzw : QuaternionOrder::wxyz;
-    if (optitrack) transport.lcm.mocap_channel = "OPTITRACK_FRAMES";
-    if (it.source == MocapSourceKind::rigid_transform) transport.lcm.mocap_channel = "VICON";
+    it.source = mocap_sources().all()[source];
+    it.quaternion = it.source.quaternion;
+    transport.lcm.mocap_channel = it.source.channel;
   }
   KEY(unit, one_of({"m", "mm"}), "of the positions sent");
   KEY(quaternion, one_of({"xyzw", "wxyz"}), "order; left out: xyzw for optitrack, else wxyz");
@@ -152,7 +72,7 @@ static void describe_mocap(Keys& key, TransportSettings& transport) {
       "of the sender's world: z_up; y_up (x, -z, y become our x, y, z); or the rotation to ours");
 }
 
-static void describe_frame(Keys& key, PlateSettings& it, bool named) {
+static void describe_frame(Keys& key, MarkerFrameSettings& it, bool named) {
   key.when(named, [&] {
     KEY(name, from(1, 40), "of the body, whose channel is lcm.mocap_channel, _, name");
   });
@@ -224,7 +144,7 @@ void describe_daemon(Keys& key, Experiment& it) {
   KEY(safety, "thresholds of the safety monitor");
   key.section({"mocap", "who sends frames, and what the numbers mean"},
               [&] { describe_mocap(key, transport); });
-  const bool named = transport.mocap.source == MocapSourceKind::rigid_transform;
+  const bool named = transport.mocap.source.channel_per_body;
   key.section({"bodies", "which bodies of a frame carry the base and the segments' ends"},
               [&] { describe_bodies(key, transport.bodies, named); });
   KEY(realtime, "the daemon's place on the machine");

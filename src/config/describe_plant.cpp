@@ -55,23 +55,20 @@ static void describe(Keys& key, BaseMotion& it) {
   KEY(phase_rad, from(-100, 100), "at t = 0");
 }
 
-static void describe(Keys& key, RefinedSettings& it) {
-  KEY(pieces, from(1, kMaxSegments), "a segment");
-  for (auto* weights : {&it.length_weights, &it.mass_weights, &it.rigidity_weights})
-    weights->resize(static_cast<std::size_t>(it.pieces), 1.0);
-  const Form weights = above(0, kMany).one_or_each();
-  KEY(length_weights, weights, "of the pieces of a segment, base to tip; their ratios count");
-  KEY(mass_weights, weights, "the same");
-  KEY(rigidity_weights, weights, "of E I, and of damping alike; the segment's k and beta stay");
-}
-
-static void describe(Keys& key, LinkSettings& it) {
-  KEY(links_per_segment, from(1, kMaxLinksPerSegment),
-      "each with two crossed revolute joints at its start");
-  KEY(joints, one_of({"crossed"}), "crossed: two angles, about x and y");
-  KEY(joint_stiffness_nm_per_rad, from(0, 1e6),
-      "of every joint about each axis; left out: k times links_per_segment");
-  KEY(joint_damping_nms_per_rad, from(0, 1e6), "the same; left out: beta times links_per_segment");
+/// The section of every kind, whichever is chosen.
+static void describe_kind(Keys& key, PlantKind& chosen) {
+  const auto names = plant_kinds().names();
+  std::size_t index = plant_kinds().index(chosen.name());
+  key("kind", index, one_of(names),
+      "pcc: the model; refined: several constant-curvature pieces a segment; links: rigid links, "
+      "the paper's section VI");
+  if (key.reading()) chosen = plant_kinds().all()[index];
+  for (PlantKind kind : plant_kinds().all()) {
+    if (!kind.has_keys()) continue;
+    const bool it_is = std::string_view(kind.name()) == chosen.name();
+    key.section({kind.name(), "for the kind of this name"},
+                [&] { (it_is ? chosen : kind).describe(key); });
+  }
 }
 
 /// What the world does to the arm.
@@ -114,11 +111,7 @@ void describe_plant(Keys& key, Experiment& experiment) {
     it.valves.supply_pressure_bar = experiment.actuation.max_pressure_bar;
     it.seed = experiment.seed;
   }
-  KEY(kind, one_of({"pcc", "refined", "links"}),
-      "pcc: the model; refined: several constant-curvature pieces a segment; links: rigid links, "
-      "the paper's section VI");
-  KEY(refined, "for kind refined");
-  KEY(links, "for kind links");
+  describe_kind(key, it.kind);
   constexpr auto kOptional = Presence::optional;
   key.section({"mismatch", "factors on the controller's model", kOptional, SectionKind::input_only},
               [&] { describe_mismatch(key, it); });

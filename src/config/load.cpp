@@ -13,9 +13,9 @@
 namespace softarm {
 namespace {
 
-/// One description reads and writes, so printing visits a copy.
-Entry entries_of(Experiment experiment, Keys::Purpose purpose) {
-  Keys keys(purpose);
+/// One description reads and writes: what is printed is a copy.
+Entry entries_of(Experiment experiment, ConfigKeys::Purpose purpose) {
+  ConfigKeys keys(purpose);
   return keys.visit([&] { describe(keys, experiment); });
 }
 
@@ -48,7 +48,7 @@ Experiment example_experiment() {
 }
 
 Experiment read(const std::filesystem::path& file) {
-  Keys keys(file);
+  ConfigKeys keys(file);
   Experiment experiment;
   keys.visit([&] { describe(keys, experiment); });
   experiment.estimation.base_is_fixed = experiment.transport.bodies.base_id < 0;
@@ -71,7 +71,7 @@ Experiment load_experiment(const std::filesystem::path& file) {
 }
 
 std::string resolved_text(const Experiment& experiment) {
-  return yaml_text(entries_of(experiment, Keys::Purpose::print), false);
+  return yaml_text(entries_of(experiment, ConfigKeys::Purpose::print), false);
 }
 
 std::string template_text() {
@@ -85,15 +85,15 @@ std::string template_text() {
 # as that of this one does: `softarm check --schema > experiment.schema.json`.
 
 )";
-  return kHeader + yaml_text(entries_of(example_experiment(), Keys::Purpose::document), true);
+  return kHeader + yaml_text(entries_of(example_experiment(), ConfigKeys::Purpose::document), true);
 }
 
 std::string schema_text() {
   Experiment example = example_experiment();
   example.reference.phases.clear();
-  for (const PhaseKind& kind : phase_kinds())
-    example.reference.phases.emplace_back().kind = kind.empty;
-  return json_schema_text(entries_of(example, Keys::Purpose::schema));
+  for (const ReferenceKind& kind : reference_kinds().all())
+    example.reference.phases.emplace_back().kind = kind;
+  return json_schema_text(entries_of(example, ConfigKeys::Purpose::schema));
 }
 
 std::string hash_text(std::uint64_t hash) { return fmt::format("{:016x}", hash); }

@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "softarm/config/keys.hpp"
+#include "softarm/config/config_keys.hpp"
 
 namespace softarm {
 
@@ -12,9 +12,9 @@ namespace softarm {
 std::string yaml_text(const Entry& root, bool documented);
 
 /// A JSON Schema (draft 7) by which editors complete and check a file. It accepts whatever is read
-/// without an error; only the reader checks conditions across several keys. Keys are required only
-/// in files without `include`. `root` was visited for Keys::Purpose::schema with one item of every
-/// kind in lists, whose required words distinguish the kinds.
+/// without an error; what depends on several keys is for the reader alone. Keys are required only
+/// in files without `include`. `root` was visited for ConfigKeys::Purpose::schema with one item of every
+/// kind in lists, whose required words tell the kinds apart.
 std::string json_schema_text(const Entry& root);
 
 }  // namespace softarm

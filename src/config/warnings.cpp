@@ -9,7 +9,6 @@
 #include "softarm/config/load.hpp"
 #include "softarm/control/gain_check.hpp"
 #include "softarm/control/reference.hpp"
-#include "softarm/control/task_space_path.hpp"
 #include "softarm/model/actuation_matrix.hpp"
 #include "softarm/model/statics.hpp"
 #include "softarm/runtime/safety_monitor.hpp"
@@ -39,11 +38,11 @@ class StaticReach {
 
   double scale(const ReferenceKind& kind) {
     double smallest = 1.0;
-    if (const auto* hold = std::get_if<SetPointReference>(&kind)) smallest = scale(hold->u_rad);
-    if (const auto* way = std::get_if<WayPointReference>(&kind)) {
+    if (const auto* hold = kind.get_if<SetPointReference>()) smallest = scale(hold->u_rad);
+    if (const auto* way = kind.get_if<WayPointReference>()) {
       for (const WayPoint& point : way->points) smallest = std::min(smallest, scale(point.u_rad));
     }
-    if (const auto* paper = std::get_if<PaperReference>(&kind)) smallest = scale(*paper);
+    if (const auto* paper = kind.get_if<PaperReference>()) smallest = scale(*paper);
     return smallest;
   }
 
@@ -101,9 +100,9 @@ std::vector<std::string> experiment_warnings(const Experiment& experiment) {
   double length_m = 0.0;
   for (const SegmentParameters& segment : experiment.arm.segments) length_m += segment.length_m;
   for (std::size_t i = 0; i < experiment.reference.phases.size(); ++i) {
-    const auto* path = std::get_if<TipPathReference>(&experiment.reference.phases[i].kind);
+    const auto* path = experiment.reference.phases[i].kind.get_if<TipPathReference>();
     if (path == nullptr) continue;
-    const double away_m = largest_distance_m(*path, experiment.arm.base_position_m);
+    const double away_m = path->largest_distance_m(experiment.arm.base_position_m);
     if (away_m > length_m) {
       warnings.push_back(fmt::format(
           "reference[{}]: the path goes {:.4g} m away from the base, the arm is {:.4g} m "

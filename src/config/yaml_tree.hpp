@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-#include "softarm/config/keys.hpp"
+#include "softarm/config/config_keys.hpp"
 
 namespace softarm {
 

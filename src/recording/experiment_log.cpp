@@ -64,7 +64,7 @@ void ExperimentLog::add(const LogRow& row) {
     for (const SegmentVector* v :
          {&row.u, &row.velocity, &row.reference, &row.truth, &row.tau_actuation})
       pair(*v, i);
-    single(row.residual_twist, i);
+    single(row.residual_torsion, i);
     single(row.residual_length, i);
   }
   for (int j = 0; j < chambers_; ++j) {

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <sstream>
 
-#include "softarm/config/keys.hpp"
+#include "softarm/config/config_keys.hpp"
 #include "softarm/model/arm.hpp"
 #include "softarm/transport/settings.hpp"
 
@@ -89,7 +89,7 @@ void describe_map(Keys& key, NamedMap& it, RecordingMap& map) {
 /// Converts names to columns of the table; reports a name in the map that the table does not have.
 class ColumnFinder {
  public:
-  ColumnFinder(const Keys& reader, const CsvTable& table) : reader_(reader), table_(table) {}
+  ColumnFinder(const ConfigKeys& reader, const CsvTable& table) : reader_(reader), table_(table) {}
 
   std::vector<std::size_t> find(const std::string& key, const std::string& names,
                                 std::size_t count) const {
@@ -126,11 +126,11 @@ class ColumnFinder {
   }
 
  private:
-  const Keys& reader_;
+  const ConfigKeys& reader_;
   const CsvTable& table_;
 };
 
-void check(const Keys& reader, const NamedMap& named, RecordingMap& map) {
+void check(const ConfigKeys& reader, const NamedMap& named, RecordingMap& map) {
   if (named.segments.size() > static_cast<std::size_t>(kMaxSegments)) {
     throw reader.error_at("segments", fmt::format("at most {}", kMaxSegments),
                           fmt::format("{}", named.segments.size()));
@@ -165,7 +165,7 @@ void check(const Keys& reader, const NamedMap& named, RecordingMap& map) {
 
 MappedTable read_mapped_table(const std::filesystem::path& table,
                               const std::filesystem::path& map) {
-  Keys keys(map);
+  ConfigKeys keys(map);
   NamedMap named;
   MappedTable out;
   const LcmSettings channels;

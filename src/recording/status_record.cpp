@@ -83,7 +83,7 @@ bool StatusRecord::take_status(std::span<const std::byte> bytes) {
   row.frame_age_s = status_.frame_age_s;
   row.u = status_.u_rad;
   row.velocity = status_.velocity_radps;
-  row.residual_twist = status_.torsion_rad;
+  row.residual_torsion = status_.torsion_rad;
   row.residual_length = status_.length_error_m;
   row.commanded = status_.pressure_bar;
   if (row.mode == Mode::active) {

@@ -164,7 +164,7 @@ void ControlPipeline::validate_and_estimate(const TickInput& input, SafetyInput&
 void ControlPipeline::watch(const TickInput& input, SafetyInput& safety) noexcept {
   if (input.measured_bar != nullptr && input.measured_bar->size() == previous_bar_.size())
     pressure_watch_.measure(*input.measured_bar);
-  safety.pressure_mismatch = settings_.safety.valve_readback && pressure_watch_.strays();
+  safety.pressure_mismatch = settings_.safety.valve_readback && pressure_watch_.out_of_tolerance();
   if (!curvature_watch_.used()) return;
   // What is judged is the balance of an arm that is observed and commanded.
   const bool under_control = safety_.mode() == Mode::active || safety_.mode() == Mode::hold;
@@ -174,7 +174,7 @@ void ControlPipeline::watch(const TickInput& input, SafetyInput& safety) noexcep
   } else {
     curvature_watch_.reset();
   }
-  safety.curvature_mismatch = curvature_watch_.strays();
+  safety.curvature_mismatch = curvature_watch_.out_of_tolerance();
 }
 
 void ControlPipeline::use_frame(const MocapFrame& frame) noexcept {

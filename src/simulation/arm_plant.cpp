@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "simulation/integrator.hpp"
-#include "simulation/plant_system.hpp"
 #include "softarm/actuation/input_map.hpp"
+#include "softarm/simulation/plant_system.hpp"
 
 namespace softarm {
 namespace {
@@ -80,7 +80,7 @@ struct ArmPlant::Implementation {
         valves(settings.valves, chamber_count(settings.actuation),
                settings.actuation.kind == ActuationKind::torque),
         map(input_map(settings.actuation)),
-        system(make_plant_system(settings)),
+        system(settings.kind.make(settings)),
         integrator(make_integrator(*system, integrator_settings(settings))),
         present_nm(Eigen::VectorXd::Zero(arm.dof())),
         target_nm(Eigen::VectorXd::Zero(arm.dof())),

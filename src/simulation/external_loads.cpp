@@ -1,4 +1,4 @@
-#include "simulation/external_loads.hpp"
+#include "softarm/simulation/external_loads.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -6,6 +6,8 @@
 #include <numbers>
 #include <stdexcept>
 #include <string>
+
+#include "softarm/simulation/settings.hpp"
 
 namespace softarm {
 namespace {

@@ -10,8 +10,8 @@
 #include <memory>
 #include <string>
 
-#include "simulation/second_order_system.hpp"
 #include "simulation/stage_solver.hpp"
+#include "softarm/simulation/second_order_system.hpp"
 #include "softarm/simulation/settings.hpp"
 
 namespace softarm {

@@ -5,6 +5,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "softarm/base/keys.hpp"
+
 namespace softarm {
 namespace {
 
@@ -33,9 +35,23 @@ inline LinkSystem::Vec3 LinkSystem::out_of(const Turn& t, const Vec3& v) {
   return {x, t.ca * v.y() - t.sa * z, t.sa * v.y() + t.ca * z};
 }
 
-LinkSystem::LinkSystem(const PlantSettings& settings)
-    : PlantSystem(settings.arm.size(), settings),
-      per_segment_(settings.links.links_per_segment),
+void LinkSettings::describe(Keys& key) {
+  key("links_per_segment", links_per_segment, from(1, kMaxLinksPerSegment),
+      "each with two crossed revolute joints at its start");
+  key("joints", joints, one_of({"crossed"}), "crossed: two angles, about x and y");
+  key("joint_stiffness_nm_per_rad", joint_stiffness_nm_per_rad, from(0, 1e6),
+      "of every joint about each axis; left out: k times links_per_segment");
+  key("joint_damping_nms_per_rad", joint_damping_nms_per_rad, from(0, 1e6),
+      "the same; left out: beta times links_per_segment");
+}
+
+std::unique_ptr<PlantSystem> LinkSettings::make(const PlantSettings& settings) const {
+  return std::make_unique<LinkSystem>(settings, *this);
+}
+
+LinkSystem::LinkSystem(const PlantSettings& settings, const LinkSettings& links)
+    : PlantSystem(settings),
+      per_segment_(links.links_per_segment),
       arm_(settings.arm),
       gravity_(arm_.base_rotation.transpose() * arm_.gravity_mps2) {
   if (per_segment_ < 1 || per_segment_ > kMaxLinksPerSegment) {
@@ -54,9 +70,9 @@ LinkSystem::LinkSystem(const PlantSettings& settings)
         .inertia_kgm2 = rod ? mass * length * length / 12.0 : 0.0,
         .payload_kg = 0.0,
         .stiffness_nm_per_rad =
-            settings.links.joint_stiffness_nm_per_rad.value_or(m * segment.stiffness_nm_per_rad),
+            links.joint_stiffness_nm_per_rad.value_or(m * segment.stiffness_nm_per_rad),
         .damping_nms_per_rad =
-            settings.links.joint_damping_nms_per_rad.value_or(m * segment.damping_nms_per_rad)};
+            links.joint_damping_nms_per_rad.value_or(m * segment.damping_nms_per_rad)};
     expect_not_negative(link.stiffness_nm_per_rad, "joint_stiffness_nm_per_rad");
     expect_not_negative(link.damping_nms_per_rad, "joint_damping_nms_per_rad");
     links_.insert(links_.end(), static_cast<std::size_t>(per_segment_), link);
@@ -353,6 +369,23 @@ void LinkSystem::segment_ends(ConstVector x, std::span<Eigen::Isometry3d> ends) 
       ends[j / m].translation() = origin;
     }
   }
+}
+
+PlantShape LinkSystem::shape(ConstVector x) const {
+  Eigen::Isometry3d frame = Eigen::Isometry3d::Identity();
+  frame.linear() = arm_.base_rotation;
+  frame.translation() = arm_.base_position_m;
+  PlantShape shape{.bend_rad = x, .points_m = {frame.translation()}};
+  for (std::size_t j = 0; j < links_.size(); ++j) {
+    const auto k = static_cast<Eigen::Index>(2 * j);
+    shape.bend_rad[k] = x[k + 1];
+    shape.bend_rad[k + 1] = -x[k];
+    frame.rotate(Eigen::AngleAxisd(x[k], Vec3::UnitX()));
+    frame.rotate(Eigen::AngleAxisd(x[k + 1], Vec3::UnitY()));
+    frame.translate(links_[j].length_m * Vec3::UnitZ());
+    shape.points_m.emplace_back(frame.translation());
+  }
+  return shape;
 }
 
 void LinkSystem::curvature(ConstVector x, ConstVector v, Vector u, Vector rate) const {

@@ -5,7 +5,7 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "simulation/plant_system.hpp"
+#include "softarm/simulation/plant_system.hpp"
 #include "softarm/simulation/settings.hpp"
 
 namespace softarm {
@@ -22,7 +22,7 @@ namespace softarm {
 class LinkSystem final : public PlantSystem {
  public:
   /// @throw std::invalid_argument for a number of links, a stiffness or a damping that cannot be.
-  explicit LinkSystem(const PlantSettings& settings);
+  LinkSystem(const PlantSettings& settings, const LinkSettings& links);
 
   int size() const override { return 2 * static_cast<int>(links_.size()); }
   void residual(double t_s, ConstVector x, ConstVector v, ConstVector a, Vector out) override;
@@ -38,6 +38,7 @@ class LinkSystem final : public PlantSystem {
   void spread(ConstVector u, Vector x) const override;
   void segment_ends(ConstVector x, std::span<Eigen::Isometry3d> ends) const override;
   void curvature(ConstVector x, ConstVector v, Vector u, Vector rate) const override;
+  PlantShape shape(ConstVector x) const override;
 
  private:
   struct Link {

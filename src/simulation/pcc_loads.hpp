@@ -4,9 +4,9 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "simulation/external_loads.hpp"
-#include "simulation/second_order_system.hpp"
 #include "softarm/model/arm.hpp"
+#include "softarm/simulation/external_loads.hpp"
+#include "softarm/simulation/second_order_system.hpp"
 
 namespace softarm {
 

@@ -9,11 +9,15 @@
 
 namespace softarm {
 
-PccSystem::PccSystem(const PlantSettings& settings)
-    : PlantSystem(settings.arm.size(), settings),
+std::unique_ptr<PlantSystem> PccSettings::make(const PlantSettings& settings) const {
+  return std::make_unique<PccSystem>(settings, settings.arm, 1);
+}
+
+PccSystem::PccSystem(const PlantSettings& settings, const ArmParameters& arm, int pieces)
+    : PlantSystem(settings),
       segments_(settings.arm.size()),
-      pieces_(settings.kind == PlantKind::refined ? settings.refined.pieces : 1),
-      arm_(pieces_of(settings)),
+      pieces_(pieces),
+      arm_(arm),
       share_(arm_.size()),
       gravity_mps2_(arm_.gravity_mps2),
       loads_(arm_, pieces_, settings.payload_kg),

@@ -6,7 +6,7 @@
 #include <Eigen/LU>
 #include <cstdint>
 
-#include "simulation/second_order_system.hpp"
+#include "softarm/simulation/second_order_system.hpp"
 
 namespace softarm {
 

@@ -2,7 +2,7 @@
 
 namespace softarm {
 
-BodyPose pose_on_body(const PlateSettings& settings) {
+BodyPose pose_on_body(const MarkerFrameSettings& settings) {
   BodyPose pose{.position_m = settings.position_m, .valid = true};
   const double angle_rad = settings.rotation_rad.norm();
   if (angle_rad != 0.0)
@@ -10,7 +10,7 @@ BodyPose pose_on_body(const PlateSettings& settings) {
   return pose;
 }
 
-PlateSettings with_pose_on_body(PlateSettings settings, const Eigen::Isometry3d& pose) {
+MarkerFrameSettings with_pose_on_body(MarkerFrameSettings settings, const Eigen::Isometry3d& pose) {
   const Eigen::AngleAxisd rotation(pose.linear());
   settings.position_m = pose.translation();
   settings.rotation_rad = rotation.angle() * rotation.axis();

@@ -141,7 +141,7 @@ int make(const FaultOptions& options) {
     send_packets(lcm.url, {flooding_frame(lcm)}, options.for_s, 0);
     return kExitOk;
   }
-  if (experiment.transport.mocap.source != MocapSourceKind::softarm)
+  if (experiment.transport.mocap.source != softarm_mocap())
     throw ConfigError(options.config, 0, "daemon.mocap.source",
                       "softarm, the only frames that this program can spoil", "another source");
   Fault fault = options.fault == "none" ? Fault{} : *find_fault(options.fault);

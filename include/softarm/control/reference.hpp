@@ -10,32 +10,11 @@
 #pragma once
 
 #include <memory>
-#include <stdexcept>
-#include <string>
 
-#include "softarm/control/inverse_kinematics.hpp"
 #include "softarm/control/settings.hpp"
 #include "softarm/model/arm.hpp"
 
 namespace softarm {
-
-/// A reference at one time: 2n numbers each; rad, rad/s, rad/s^2.
-struct ReferenceSample {
-  SegmentVector u;
-  SegmentVector velocity;
-  SegmentVector acceleration;
-  /// The same in polar coordinates [phi, theta] a segment, where the reference knows them without
-  /// dividing by theta
-  /// ((24) outside of a blend); otherwise has_polar is false and they are unspecified.
-  bool has_polar = false;
-  SegmentVector polar;
-  SegmentVector polar_velocity;
-  SegmentVector polar_acceleration;
-  bool limited = false;  ///< a soft limit (theta or speed) bent this sample, or could not
-  /// Where the tip should be, in a phase that is given in task space; joining not counted.
-  bool has_tip = false;
-  TipReference tip;
-};
 
 /// A reference now and a little before and after, for the derivative that inverts the valve lag.
 struct ReferenceWindow {
@@ -53,17 +32,6 @@ enum class LiveVerdict {
   not_finite,
   out_of_limits,  ///< beyond max_theta_rad or max_speed_radps
   step_too_large  ///< further than max_step_rad from the reference so far
-};
-
-/// What is wrong with a phase of a reference. what() is "reference[1].points[2].time_s: expected X,
-/// got Y", with the key that an experiment has there.
-class ReferenceError : public std::invalid_argument {
- public:
-  /// @param place  within the phase, such as ".points[2].time_s"; empty: the phase as a whole
-  ReferenceError(int phase, const std::string& place, std::string expected_text,
-                 std::string got_text);
-
-  std::string key, expected, got;
 };
 
 /// Largest theta that a reference reaches, live ones apart (0).

@@ -3,11 +3,9 @@
 // config/template.yaml documents every setting.
 #pragma once
 
-#include <Eigen/Core>
-#include <string>
-#include <variant>
 #include <vector>
 
+#include "softarm/control/reference_kinds.hpp"
 #include "softarm/model/arm.hpp"
 
 namespace softarm {
@@ -63,57 +61,6 @@ struct ControllerSettings {
   double polar_theta_min_rad = 0.05;
   TaskSpaceSettings task_space;
 };
-
-/// Hold u constant.
-struct SetPointReference {
-  std::vector<double> u_rad;  ///< 2n
-};
-
-/// The paper's (24): theta rises to `theta_rad` in `rise_s`, phi_i = phi_centre + phi_amplitude
-/// cos(rate t + (i-1) phase).
-struct PaperReference {
-  double theta_rad = 0.4;
-  double rise_s = 1.0;
-  double phi_centre_rad = 3.141592653589793;
-  double phi_amplitude_rad = 1.0;
-  double rate_radps = 2.0;
-  double phase_step_rad = 1.0471975511965976;
-};
-
-/// Where the arm is to be at a time of the phase.
-struct WayPoint {
-  double time_s = 0.0;
-  std::vector<double> u_rad;  ///< 2n
-};
-/// Smooth motion through way points: minimum-jerk (quintic) pieces, at rest in every point.
-struct WayPointReference {
-  std::vector<WayPoint> points;
-  bool repeat = false;
-};
-
-/// References received over LCM; until one arrives, the arm holds where it is.
-struct LiveReference {
-  double timeout_s = 0.2;
-};
-
-/// Path p_d(t) of the tip in the world.
-enum class TipPathShape {
-  point,      ///< p_d = centre
-  circle,     ///< p_d = centre + first_axis cos(rate t) + second_axis sin(rate t); an ellipse
-  lemniscate  ///< p_d = centre + first_axis cos(rate t) + second_axis sin(2 rate t)
-};
-
-/// Where the tip should be, in the world frame; the defaults are the paper's lemniscate (22).
-struct TipPathReference {
-  TipPathShape shape = TipPathShape::lemniscate;
-  Eigen::Vector3d centre_m = Eigen::Vector3d(-0.25, 0.0, -0.5);
-  Eigen::Vector3d first_axis_m = Eigen::Vector3d(0.0, 1.0 / 3.0, 0.0);
-  Eigen::Vector3d second_axis_m = Eigen::Vector3d(0.0, 0.0, 1.0 / 6.0);
-  double rate_radps = 0.6283185307179586;
-};
-
-using ReferenceKind = std::variant<SetPointReference, PaperReference, WayPointReference,
-                                   LiveReference, TipPathReference>;
 
 /// One phase of a sequence; the last one lasts for ever.
 struct ReferencePhase {

@@ -7,23 +7,13 @@
 #include <filesystem>
 #include <memory>
 #include <string>
-#include <vector>
 
 #include "softarm/config/experiment.hpp"
 #include "softarm/runtime/log_row.hpp"
 
 namespace softarm {
 
-/// The bend of every part as u (2 numbers per part, rad), from the plant's coordinates. Parts are
-/// segments, pieces, or links (R_x(a) R_y(b) is u = (b, -a) to first order).
-Eigen::VectorXd part_bends(const PlantSettings& plant, const Eigen::VectorXd& coordinates);
-
-/// Points along the arm from base to tip, in m in the world frame: the ends of every link, or
-/// points on every arc. Their number depends only on the plant.
-std::vector<Eigen::Vector3d> arm_points(const PlantSettings& plant,
-                                        const Eigen::VectorXd& coordinates);
-
-/// Writes a row of bends and points every 20 ms; no file if there is no simulated arm.
+/// Writes a row of the plant's shape every 20 ms; no file where there is no simulated arm.
 class ShapeLog {
  public:
   /// Removes the file of an earlier run from `folder`.
@@ -42,6 +32,7 @@ class ShapeLog {
   std::filesystem::path path_;
   std::string origin_;
   PlantSettings plant_;
+  std::unique_ptr<PlantSystem> arm_;  // of plant_, made for the first row
   std::unique_ptr<std::FILE, Closer> file_;
   double next_s_ = 0.0;
   std::string line_;

@@ -34,7 +34,7 @@ class PressureWatch {
   void reset() noexcept;
 
   /// The last kInRow measurements were outside the range by more than the tolerance.
-  bool strays() const noexcept { return in_row_ >= kInRow; }
+  bool out_of_tolerance() const noexcept { return in_row_ >= kInRow; }
 
  private:
   struct Range {
@@ -65,7 +65,7 @@ class CurvatureWatch {
   /// Whether the settings have a limit.
   bool used() const noexcept { return limit_nm_ > 0.0; }
   /// Some segment's residual was above the limit throughout the settling time.
-  bool strays() const noexcept { return strays_; }
+  bool out_of_tolerance() const noexcept { return strays_; }
   /// Starts again, for a gap in which the arm was not under control.
   void reset() noexcept { strays_ = beyond_ = false; }
 

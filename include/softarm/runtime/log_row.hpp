@@ -20,7 +20,7 @@ struct LogRow {
   double frame_age_s = std::numeric_limits<double>::quiet_NaN();
   SegmentVector u, velocity, reference, truth;        ///< 2n each, rad and rad/s
   SegmentVector tau_actuation;                        ///< 2n, N m
-  SegmentVector residual_twist, residual_length;      ///< n each, rad and m
+  SegmentVector residual_torsion, residual_length;    ///< n each, rad and m
   PressureVector commanded, real;                     ///< bar
   std::optional<Eigen::Vector3d> tip, tip_reference;  ///< m, world
   bool tip_is_asked =

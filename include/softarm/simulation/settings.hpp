@@ -3,12 +3,12 @@
 #pragma once
 
 #include <cstdint>
-#include <optional>
-#include <string>
 #include <vector>
 
 #include "softarm/actuation/settings.hpp"
 #include "softarm/model/arm.hpp"
+#include "softarm/simulation/external_loads.hpp"
+#include "softarm/simulation/plant_kinds.hpp"
 
 namespace softarm {
 
@@ -31,62 +31,6 @@ struct MocapSettings {
   double position_resolution_m = 0.0;
   double dropout_probability = 0.0;
   bool noise_on_base = true;
-};
-
-/// What the simulated arm is made of.
-enum class PlantKind {
-  pcc,      ///< the model itself: one constant-curvature piece a segment
-  refined,  ///< several constant-curvature pieces a segment; converges to a bending rod
-  links     ///< the paper's section VI: rigid links joined by two crossed revolute joints
-};
-
-/// `PlantKind::refined`. Weights say how a segment's length, mass and bending rigidity E I (and
-/// damping with it) vary along it, one number a piece; empty: all alike. Only their ratios count:
-/// length, mass, and the bend under a uniform moment stay those of the segment.
-struct RefinedSettings {
-  int pieces = 8;  ///< a segment; kMaxSegments pieces at most in the whole arm
-  std::vector<double> length_weights;
-  std::vector<double> mass_weights;
-  std::vector<double> rigidity_weights;
-};
-
-inline constexpr int kMaxLinksPerSegment = 64;
-
-/// The two angles of a link's joint: a about x, then b about y.
-enum class LinkJoints { crossed };
-
-/// `PlantKind::links`. Stiffness and damping act about each of the two axes of a joint; left out
-/// they are those of the segment times the number of its links, so that equal moments on the joints
-/// bend it as they bend the segment.
-struct LinkSettings {
-  int links_per_segment = 6;
-  LinkJoints joints = LinkJoints::crossed;
-  std::optional<double> joint_stiffness_nm_per_rad;
-  std::optional<double> joint_damping_nms_per_rad;
-};
-
-/// How an external load changes in time.
-enum class LoadShape {
-  constant,  ///< switched on and off
-  half_sine  ///< a blow: half a sine wave over the duration
-};
-
-/// A force and a moment on the end of a segment, in world axes.
-struct ExternalLoad {
-  int segment = 0;  ///< 1..n from the base; 0: the tip
-  Eigen::Vector3d force_n = Eigen::Vector3d::Zero();
-  Eigen::Vector3d moment_nm = Eigen::Vector3d::Zero();
-  LoadShape shape = LoadShape::constant;
-  double start_s = 0.0;
-  double duration_s = 0.0;
-};
-
-/// A base that is carried to and fro, without turning: base_position + amplitude sin(2 pi frequency
-/// t + phase).
-struct BaseMotion {
-  Eigen::Vector3d amplitude_m = Eigen::Vector3d::Zero();
-  double frequency_hz = 0.0;
-  double phase_rad = 0.0;
 };
 
 /// Which method of SUNDIALS integrates; docs/results/plant_methods.md has what each costs. The
@@ -115,9 +59,7 @@ struct IntegratorCounters {
 
 /// The simulated arm. Its `arm` and `actuation` may differ from the controller's model.
 struct PlantSettings {
-  PlantKind kind = PlantKind::pcc;
-  RefinedSettings refined;
-  LinkSettings links;
+  PlantKind kind;  ///< what it is made of
   ArmParameters arm;
   ActuationSettings actuation;
   ValveSettings valves;

@@ -9,9 +9,9 @@
 namespace softarm {
 
 /// Pose of S_i in the frame of the body that carries it; always `valid`.
-BodyPose pose_on_body(const PlateSettings& settings);
+BodyPose pose_on_body(const MarkerFrameSettings& settings);
 /// The same settings with another pose on the body.
-PlateSettings with_pose_on_body(PlateSettings settings, const Eigen::Isometry3d& pose);
+MarkerFrameSettings with_pose_on_body(MarkerFrameSettings settings, const Eigen::Isometry3d& pose);
 
 inline Eigen::Isometry3d to_isometry(const BodyPose& pose) {
   return Eigen::Translation3d(pose.position_m) * pose.orientation;

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "softarm/estimation/clock_relation.hpp"
+#include "softarm/transport/mocap_format.hpp"
 
 namespace softarm {
 
@@ -26,20 +27,12 @@ struct LcmSettings {
   std::string deadman_channel;
 };
 
-/// Sender of the frames, and the type of its messages.
-enum class MocapSourceKind {
-  softarm,         ///< mocap_frame_t
-  optitrack,       ///< optitrack_frame_t
-  rigid_transform  ///< rigid_transform_t, one channel per body: lcm.mocap_channel, _, its name
-};
-/// Order in which the four numbers of a quaternion are sent.
-enum class QuaternionOrder { xyzw, wxyz };
-/// Unit in which positions are sent.
+/// Of positions as they are sent.
 enum class LengthUnit { metre, millimetre };
 
 /// Meaning of the numbers in a frame.
 struct MocapSourceSettings {
-  MocapSourceKind source = MocapSourceKind::softarm;
+  MocapSourceKind source = softarm_mocap();
   LengthUnit unit = LengthUnit::metre;
   QuaternionOrder quaternion = QuaternionOrder::wxyz;
   /// p_world = axes * p_sent: from the sender's world to ours, whose z axis points up.
@@ -48,27 +41,28 @@ struct MocapSourceSettings {
 
 /// A marker frame: the pose of the segment frame S_i in the frame of the rigid body that is
 /// tracked.
-struct PlateSettings {
+struct MarkerFrameSettings {
   std::string name;
   Eigen::Vector3d position_m = Eigen::Vector3d::Zero();
   /// Rotation vector of S_i in the body's frame: R_world_S = R_world_body exp(rotation^).
   Eigen::Vector3d rotation_rad = Eigen::Vector3d::Zero();
 
   /// Equal in every field.
-  bool operator==(const PlateSettings&) const = default;
+  bool operator==(const MarkerFrameSettings&) const = default;
 };
 
 /// The channel of a body where every body has a separate one (MocapSourceKind::rigid_transform).
-inline std::string body_channel(const LcmSettings& lcm, const PlateSettings& plate) {
+inline std::string body_channel(const LcmSettings& lcm, const MarkerFrameSettings& plate) {
   return lcm.mocap_channel + "_" + plate.name;
 }
 
 /// Which bodies of the motion-capture frame carry the base and the segment ends.
 struct BodySettings {
-  int base_id = 0;                                 ///< -1: the base is fixed by arm.base
-  std::vector<int> segment_ids;                    ///< n ids, from the base to the tip
-  PlateSettings base_plate = {};                   ///< unused where the base is fixed
-  std::vector<PlateSettings> segment_plates = {};  ///< n, or none: S_i are then the body frames
+  int base_id = 0;                      ///< -1: the base is fixed by arm.base
+  std::vector<int> segment_ids;         ///< n ids, from the base to the tip
+  MarkerFrameSettings base_plate = {};  ///< unused where the base is fixed
+  std::vector<MarkerFrameSettings> segment_plates =
+      {};  ///< n, or none: S_i are then the body frames
 };
 
 /// Connections of softarmd.

@@ -35,12 +35,12 @@ struct CalibrateOptions {
 
 /// Body poses: as the source sends them, in our world, without the configured marker frames.
 Experiment without_plates(Experiment experiment) {
-  const auto clear = [](PlateSettings& plate) {
+  const auto clear = [](MarkerFrameSettings& plate) {
     plate.position_m.setZero();
     plate.rotation_rad.setZero();
   };
   clear(experiment.transport.bodies.base_plate);
-  for (PlateSettings& plate : experiment.transport.bodies.segment_plates) clear(plate);
+  for (MarkerFrameSettings& plate : experiment.transport.bodies.segment_plates) clear(plate);
   return experiment;
 }
 

@@ -109,10 +109,10 @@ int identify(IdentifyCommand& command) {
   }
 
   const MotionRecord record = record_of(experiment, command);
-  const ParameterSet set(believed(experiment), experiment.actuation.kind, command.choice);
+  const ParameterSet set(configured(experiment), experiment.actuation.kind, command.choice);
   if (command.linear) {
-    const LinearFit fit = fit_linear_and_lag(set, record, set.believed(), command.options.window_s,
-                                             command.options.longest_lag_s);
+    const LinearFit fit = fit_linear_and_lag(
+        set, record, set.configured(), command.options.window_s, command.options.longest_lag_s);
     fmt::print("{}", linear_table(set, fit));
     return kExitOk;
   }
@@ -130,7 +130,7 @@ int identify(IdentifyCommand& command) {
     return kExitOk;
   }
   if (command.predict) {
-    const Refinement fit = predict(set, record, set.of(believed(experiment)));
+    const Refinement fit = predict(set, record, set.of(configured(experiment)));
     fmt::print(
         "{} predicts u to {:.4g} mrad rms a component; the motion's own is {:.4g} mrad rms "
         "about its mean\n",

@@ -16,7 +16,9 @@ namespace {
 
 constexpr std::size_t kFewestFrames = 50;
 
-Eigen::Isometry3d pose_of(const PlateSettings& plate) { return to_isometry(pose_on_body(plate)); }
+Eigen::Isometry3d pose_of(const MarkerFrameSettings& plate) {
+  return to_isometry(pose_on_body(plate));
+}
 
 /// The shape that gravity gives the arm without pressure.
 Eigen::VectorXd hanging_shape(const ArmParameters& arm) {
@@ -161,11 +163,12 @@ std::string plates_text(const BodySettings& before, const RestCalibration& found
   std::string text =
       "\nplates: where S_i sits on its body, and how far that is from what was configured\n";
   for (std::size_t i = before.base_id < 0 ? 1 : 0; i < found.body.size(); ++i) {
-    const PlateSettings& now =
+    const MarkerFrameSettings& now =
         i == 0 ? found.bodies.base_plate : found.bodies.segment_plates[i - 1];
-    PlateSettings was = before.base_plate;
+    MarkerFrameSettings was = before.base_plate;
     if (i > 0)
-      was = i <= before.segment_plates.size() ? before.segment_plates[i - 1] : PlateSettings{};
+      was =
+          i <= before.segment_plates.size() ? before.segment_plates[i - 1] : MarkerFrameSettings{};
     const Eigen::Isometry3d from = pose_of(was).inverse() * pose_of(now);
     const Eigen::Vector3d mm = 1e3 * now.position_m, mrad = 1e3 * now.rotation_rad;
     text += fmt::format(
@@ -245,8 +248,8 @@ std::string calibration_text(const Experiment& experiment, const RestCalibration
 
 std::string calibrated_yaml(const Experiment& experiment, const RestCalibration& found,
                             const std::string& note, const std::string& config) {
-  const bool named = experiment.transport.mocap.source == MocapSourceKind::rigid_transform;
-  const auto plate = [&](const PlateSettings& each) {
+  const bool named = experiment.transport.mocap.source.channel_per_body;
+  const auto plate = [&](const MarkerFrameSettings& each) {
     const Eigen::Vector3d &p = each.position_m, &r = each.rotation_rad;
     return fmt::format(
         "{{{}position_m: [{:.9f}, {:.9f}, {:.9f}], rotation_rad: [{:.9f}, {:.9f}, {:.9f}]}}",
@@ -257,7 +260,7 @@ std::string calibrated_yaml(const Experiment& experiment, const RestCalibration&
   if (found.bodies.base_id >= 0)
     text += fmt::format("    base_plate: {}\n", plate(found.bodies.base_plate));
   text += "    segment_plates:\n";
-  for (const PlateSettings& each : found.bodies.segment_plates)
+  for (const MarkerFrameSettings& each : found.bodies.segment_plates)
     text += fmt::format("      - {}\n", plate(each));
   return text;
 }

@@ -40,7 +40,7 @@ std::string chambers_yaml(const ArmHypothesis& arm, const char* indent) {
     std::vector<double> angles, gains;
     for (std::size_t j = 0; j < arm.segment_of.size(); ++j) {
       if (arm.segment_of[j] != i) continue;
-      const Eigen::Vector2d push = -arm.push.col(static_cast<Eigen::Index>(j));
+      const Eigen::Vector2d push = -arm.input_map.col(static_cast<Eigen::Index>(j));
       gains.push_back(std::max(1e-9, push.norm()));
       double angle = std::atan2(push.y(), push.x());
       if (angle < -1e-12) angle += 2.0 * std::numbers::pi;

@@ -97,7 +97,7 @@ ModelComparison compare_models(const Experiment& experiment, const MotionRecord&
         progress(fmt::format("{}: {}", variant.name, text));
       };
     }
-    ArmHypothesis start = believed(experiment);
+    ArmHypothesis start = configured(experiment);
     if (!variant.choice.damping && !variant.choice.inertia)
       for (SegmentParameters& segment : start.arm.segments)
         segment.damping_nms_per_rad = kUndamped_s * segment.stiffness_nm_per_rad;

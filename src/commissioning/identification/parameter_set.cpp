@@ -37,7 +37,7 @@ ParameterSet::ParameterSet(const ArmHypothesis& start, ActuationKind kind, const
   add_impedance(choice);
   if (choice.gains_free && kind == ActuationKind::chambers) {
     add_gains(choice);
-    if (choice.directions) start_.push.setZero();
+    if (choice.directions) start_.input_map.setZero();
   }
   add_times(choice);
 }
@@ -98,18 +98,18 @@ void ParameterSet::add_gains(const FitChoice& choice) {
             ? fmt::format(", segment {}", g + 1)
             : fmt::format(", segment {} chamber {}", start_.segment_of[first] + 1, side[first] + 1);
     // Chambers that share a gain keep their ratios.
-    const double scale = start_.push.col(members.front()).norm();
+    const double scale = start_.input_map.col(members.front()).norm();
     const auto add = [&](const char* name, Eigen::Vector2d (*axis)(const Eigen::Vector2d&)) {
       parameters_.push_back(
           {name + which, "N m/bar", scale,
-           [=, reference = start_.push](const ArmHypothesis& arm) {
-             return axis(reference.col(members.front())).dot(arm.push.col(members.front()));
+           [=, reference = start_.input_map](const ArmHypothesis& arm) {
+             return axis(reference.col(members.front())).dot(arm.input_map.col(members.front()));
            },
-           [=, reference = start_.push](ArmHypothesis& arm, double value) {
+           [=, reference = start_.input_map](ArmHypothesis& arm, double value) {
              for (const Eigen::Index j : members) {
                const Eigen::Vector2d direction = axis(reference.col(j));
-               arm.push.col(j) +=
-                   (value / scale * reference.col(j).norm() - direction.dot(arm.push.col(j))) *
+               arm.input_map.col(j) +=
+                   (value / scale * reference.col(j).norm() - direction.dot(arm.input_map.col(j))) *
                    direction;
              }
            },

@@ -122,7 +122,7 @@ class Search {
  public:
   Search(const Comparison& comparison, const ParameterSet& set, const RefinementOptions& options)
       : comparison_(comparison),
-        believed_(set.believed()),
+        believed_(set.configured()),
         lowest_(set.lowest()),
         options_(options),
         measured_(comparison.measured()) {}

@@ -23,11 +23,11 @@ ArmHypothesis hypothesis(const ArmParameters& arm, const ActuationSettings& actu
   ArmHypothesis out;
   out.arm = arm;
   out.rest_rad.setZero(arm.dof());
-  out.push.resize(2, chamber_count(actuation));
+  out.input_map.resize(2, chamber_count(actuation));
   Eigen::Index first = 0;
   for (std::size_t i = 0; i < actuation.segments.size(); ++i) {
     const Eigen::Matrix2Xd map = input_map(actuation.kind, actuation.segments[i]);
-    out.push.middleCols(first, map.cols()) = map;
+    out.input_map.middleCols(first, map.cols()) = map;
     out.segment_of.insert(out.segment_of.end(), actuation.segments[i].size(), static_cast<int>(i));
     first += map.cols();
   }
@@ -123,7 +123,7 @@ class Motion {
 
 }  // namespace
 
-ArmHypothesis believed(const Experiment& experiment) {
+ArmHypothesis configured(const Experiment& experiment) {
   ArmHypothesis out = hypothesis(experiment.arm, experiment.actuation);
   const IdentificationSettings& extra = experiment.identification;
   for (std::size_t c = 0; c < extra.rest_u_rad.size(); ++c)
@@ -144,8 +144,9 @@ ArmHypothesis of_plant(const Experiment& experiment) {
 void push_force(const ArmHypothesis& arm, ConstVectorRef u, const Eigen::VectorXd& input,
                 VectorRef force) {
   force.setZero();
-  for (Eigen::Index j = 0; j < arm.push.cols(); ++j)
-    force.segment<2>(2 * arm.segment_of[static_cast<std::size_t>(j)]) += input[j] * arm.push.col(j);
+  for (Eigen::Index j = 0; j < arm.input_map.cols(); ++j)
+    force.segment<2>(2 * arm.segment_of[static_cast<std::size_t>(j)]) +=
+        input[j] * arm.input_map.col(j);
   if (arm.arm.actuation == ActuationModel::chamber) return;
   for (Eigen::Index i = 0; i < arm.arm.size(); ++i) {
     const Eigen::Vector2d f = force.segment<2>(2 * i);  // = A_chamber tau_A
@@ -216,7 +217,7 @@ bool ResponseModel::simulate(const ArmHypothesis& arm, double longest_step_s,
   LaggedInput input(record_.input, arm.lag_s, arm.dead_time_s);
   Motion motion(arm);
   motion.reserve(dof);
-  Eigen::VectorXd p0(arm.push.cols()), p1 = p0, p2 = p0, v = Eigen::VectorXd::Zero(dof);
+  Eigen::VectorXd p0(arm.input_map.cols()), p1 = p0, p2 = p0, v = Eigen::VectorXd::Zero(dof);
   input.at(record_.time_s[0], p0);
   const std::optional<Eigen::VectorXd> settled = motion.settled(p0);
   if (!settled) return false;

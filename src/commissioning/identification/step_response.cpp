@@ -35,7 +35,8 @@ std::vector<std::vector<double>> torque_commands(const Experiment& experiment, d
 
 /// What is identified to a thousandth must be simulated better than that.
 PlantSettings accurate(PlantSettings settings) {
-  if (settings.kind != PlantKind::pcc) return settings;  // its difference to the model is larger
+  if (settings.kind.get_if<PccSettings>() == nullptr)
+    return settings;  // its difference to the model is larger
   settings.method = IntegratorMethod::cash4;
   settings.relative_tolerance = 1e-6;
   settings.absolute_tolerance = 1e-8;

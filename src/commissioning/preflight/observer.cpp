@@ -64,8 +64,7 @@ void Observer::take_frame(const CapturedFrame& captured) {
 /// Bodies that nobody configured.
 void Observer::note_ids(std::span<const std::byte> bytes) {
   softarm_messages::mocap_frame_t message;
-  if (client_.experiment().transport.mocap.source != MocapSourceKind::softarm ||
-      !decode(bytes, message))
+  if (client_.experiment().transport.mocap.source != softarm_mocap() || !decode(bytes, message))
     return;
   for (const auto& body : message.bodies)
     if (known_ids_.insert(body.id).second) seen_.other_ids.push_back(body.id);

@@ -24,7 +24,7 @@ constexpr double kLongestLatency_s = 1.0;  ///< more than that is two clocks
 std::string body_name(std::size_t index, const TransportSettings& transport) {
   const BodySettings& bodies = transport.bodies;
   const std::string what = index == 0 ? "base" : fmt::format("end of segment {}", index);
-  if (transport.mocap.source == MocapSourceKind::rigid_transform)
+  if (transport.mocap.source.channel_per_body)
     return fmt::format("{} (channel {})", what,
                        body_channel(transport.lcm, index == 0 ? bodies.base_plate
                                                               : bodies.segment_plates[index - 1]));

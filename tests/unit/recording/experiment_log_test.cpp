@@ -57,7 +57,7 @@ TEST_F(WrittenLog, EveryNumberStandsUnderItsName) {
   row.frame_age_s = 0.012;
   row.u = Eigen::VectorXd::LinSpaced(6, 0.1, 0.6);
   row.truth = -row.u;
-  row.residual_twist = Eigen::Vector3d(0.01, 0.02, 0.03);
+  row.residual_torsion = Eigen::Vector3d(0.01, 0.02, 0.03);
   row.commanded = Eigen::VectorXd::LinSpaced(12, 1.0, 12.0);
   row.tip = Eigen::Vector3d(-0.1, 0.2, -0.3);
   const auto found = lines({row});

@@ -5,18 +5,17 @@
 #include <cmath>
 #include <numbers>
 
-#include "simulation/plant_system.hpp"
 #include "softarm/simulation/arm_plant.hpp"
 #include "softarm/simulation/mocap_simulator.hpp"
+#include "softarm/simulation/plant_system.hpp"
 #include "unit/simulation/paper_arm.hpp"
 
 namespace softarm {
 namespace {
 
-PlantSettings three_segments(PlantKind kind) {
+PlantSettings three_segments(MakeKind kind) {
   PlantSettings settings = paper_arm(MassModel::distributed, 3);
-  settings.kind = kind;
-  settings.refined.pieces = settings.links.links_per_segment = 3;
+  settings.kind = kind(3);
   set_torque_actuation(settings.actuation, 3, 10.0);
   settings.valves.supply_pressure_bar = 10.0;
   settings.arm.base_rotation =
@@ -26,15 +25,14 @@ PlantSettings three_segments(PlantKind kind) {
   return settings;
 }
 
-class AllKindsUnderLoads : public ::testing::TestWithParam<PlantKind> {};
-INSTANTIATE_TEST_SUITE_P(All, AllKindsUnderLoads,
-                         ::testing::Values(PlantKind::pcc, PlantKind::refined, PlantKind::links));
+class AllKindsUnderLoads : public ::testing::TestWithParam<MakeKind> {};
+INSTANTIATE_TEST_SUITE_P(All, AllKindsUnderLoads, ::testing::Values(kPcc, kRefined, kLinks));
 
 /// r with the load minus r without, at some state.
 Eigen::VectorXd effect(const PlantSettings& with, const PlantSettings& without,
                        const Eigen::VectorXd& x, const Eigen::VectorXd& v, const Eigen::VectorXd& a,
                        double t_s = 0.0) {
-  const auto loaded = make_plant_system(with), bare = make_plant_system(without);
+  const auto loaded = with.kind.make(with), bare = without.kind.make(without);
   loaded->external_loads().enter(t_s);
   Eigen::VectorXd one(x.size()), other(x.size());
   loaded->residual(t_s, x, v, a, one);
@@ -47,7 +45,7 @@ struct State {
 };
 
 State some_state(const PlantSettings& settings) {
-  const auto system = make_plant_system(settings);
+  const auto system = settings.kind.make(settings);
   State state;
   for (Eigen::VectorXd* each : {&state.x, &state.v, &state.a}) each->setZero(system->size());
   system->spread(settings.initial_u_rad, state.x);
@@ -62,7 +60,7 @@ State some_state(const PlantSettings& settings) {
 /// End of a segment on the path x + t v + t^2 a / 2.
 Eigen::Isometry3d end_at(const PlantSettings& settings, const State& state, std::size_t segment,
                          double t) {
-  const auto system = make_plant_system(settings);
+  const auto system = settings.kind.make(settings);
   std::vector<Eigen::Isometry3d> ends(3);
   system->segment_ends(state.x + t * state.v + 0.5 * t * t * state.a, ends);
   return ends[segment];
@@ -160,7 +158,7 @@ TEST_P(AllKindsUnderLoads, AllTogetherBalanceTheirEnergies) {
 }
 
 TEST(ExternalLoads, ABlowIsNotSteppedOverHoweverShort) {
-  PlantSettings settings = three_segments(PlantKind::pcc);
+  PlantSettings settings = three_segments(kPcc);
   settings.arm.gravity_mps2.setZero();
   settings.initial_u_rad.setZero();
   settings.loads = {{.force_n = {5.0, 0.0, 0.0},
@@ -175,7 +173,7 @@ TEST(ExternalLoads, ABlowIsNotSteppedOverHoweverShort) {
 }
 
 TEST(ExternalLoads, RefusesWhatCannotBe) {
-  const PlantSettings good = three_segments(PlantKind::pcc);
+  const PlantSettings good = three_segments(kPcc);
   PlantSettings bad = good;
   bad.loads = {{.segment = 4}};
   EXPECT_THROW(ArmPlant{bad}, std::invalid_argument);
@@ -189,7 +187,7 @@ TEST(ExternalLoads, RefusesWhatCannotBe) {
 }
 
 TEST(ImperfectValves, DeadTimeShiftsEverythingByItself) {
-  PlantSettings settings = three_segments(PlantKind::pcc);
+  PlantSettings settings = three_segments(kPcc);
   settings.initial_u_rad.setZero();
   settings.arm.base_rotation = Eigen::Vector3d(1.0, -1.0, -1.0).asDiagonal();
   settings.valves.lag_s = 0.02;

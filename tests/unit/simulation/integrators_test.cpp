@@ -124,15 +124,13 @@ TEST_P(Integrators, AnAbsurdToleranceIsAnErrorNotAWrongState) {
 }
 
 struct Kind {
-  PlantKind kind;
+  MakeKind kind;
   MassModel mass;
 };
 
 SegmentVector end_of(const Kind& kind, IntegratorMethod method, double tolerance, double lag_s) {
   PlantSettings settings = paper_arm(kind.mass, 2);
-  settings.kind = kind.kind;
-  settings.refined.pieces = 2;
-  settings.links.links_per_segment = 2;
+  settings.kind = kind.kind(2);
   settings.valves.lag_s = lag_s;
   settings.method = method;
   settings.relative_tolerance = tolerance;
@@ -145,17 +143,17 @@ SegmentVector end_of(const Kind& kind, IntegratorMethod method, double tolerance
 }
 
 TEST_P(Integrators, AgreeOnEveryKindOfPlantBehindValvesAndWithout) {
-  for (const Kind& kind : {Kind{PlantKind::pcc, MassModel::point},
-                           {PlantKind::pcc, MassModel::distributed},
-                           {PlantKind::refined, MassModel::distributed},
-                           {PlantKind::links, MassModel::distributed}}) {
+  for (const Kind& kind : {Kind{kPcc, MassModel::point},
+                           {kPcc, MassModel::distributed},
+                           {kRefined, MassModel::distributed},
+                           {kLinks, MassModel::distributed}}) {
     for (const double lag_s : {0.0, 0.02}) {
       const SegmentVector tight = end_of(kind, IntegratorMethod::cash4, 1e-10, lag_s);
       const auto error = [&](double tolerance) {
         return (end_of(kind, GetParam(), tolerance, lag_s) - tight).lpNorm<Eigen::Infinity>();
       };
-      EXPECT_LT(error(1e-4), 2e-3) << static_cast<int>(kind.kind) << " lag " << lag_s;
-      EXPECT_LT(error(1e-6), 2e-5) << static_cast<int>(kind.kind) << " lag " << lag_s;
+      EXPECT_LT(error(1e-4), 2e-3) << kind.kind(2).name() << " lag " << lag_s;
+      EXPECT_LT(error(1e-6), 2e-5) << kind.kind(2).name() << " lag " << lag_s;
     }
   }
 }

@@ -32,6 +32,7 @@
 #include "softarm/transport/message_decoding.hpp"
 #include "softarm/transport/mocap_adapter.hpp"
 #include "softarm/transport/settings.hpp"
+#include "softarm/transport/softarm_mocap.hpp"
 
 namespace softarm {
 namespace {
@@ -86,7 +87,7 @@ class Scene {
         20000 + getpid() % 40000, result.fifo, kPriority,
         options.cpu < 0 ? "any" : std::to_string(options.cpu));
     experiment_ = load_experiment(folder_ / "loop.yaml");
-    if (experiment_.transport.mocap.source != MocapSourceKind::softarm)
+    if (experiment_.transport.mocap.source != softarm_mocap())
       throw ConfigError(options.config, 0, "daemon.mocap.source",
                         "softarm, whose frames this bench sends", "another source");
     make_frames();
@@ -150,12 +151,14 @@ void Scene::make_frames() {
   MocapFrame frame;
   frame.segments = arm.size();
   frame.body[0] = {arm.base_position_m, Eigen::Quaterniond(arm.base_rotation), true};
+  const auto sent = std::make_unique<SentFrame>();
   for (std::size_t k = 0; k < frames_.size(); ++k) {
     for (std::size_t i = 0; i < ends.size(); ++i)
       frame.body[i + 1] = {
           ends[i].translation() + 1e-5 * static_cast<double>(k) * Eigen::Vector3d::UnitX(),
           Eigen::Quaterniond(ends[i].linear()), true};
-    MocapAdapter(experiment_.transport.bodies, arm).to_message(frame, 0, frames_[k]);
+    MocapAdapter(experiment_.transport.bodies, arm).to_sent(frame, 0, *sent);
+    to_message(*sent, frames_[k]);
   }
 }
 

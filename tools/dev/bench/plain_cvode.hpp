@@ -4,7 +4,7 @@
 #include <Eigen/Core>
 #include <memory>
 
-#include "simulation/second_order_system.hpp"
+#include "softarm/simulation/second_order_system.hpp"
 
 namespace softarm {
 

@@ -22,7 +22,7 @@ class DrivenSystem final : public SecondOrderSystem {
  public:
   DrivenSystem(const PlantSettings& settings, Scene scene)
       : settings_(settings),
-        plant_(make_plant_system(settings)),
+        plant_(settings.kind.make(settings)),
         smooth_(scene == Scene::smooth),
         force_(Eigen::VectorXd::Zero(settings.arm.dof())) {
     hold(force_);
@@ -96,27 +96,25 @@ Eigen::VectorXd smooth_drive_nm(const PlantSettings& settings, double t_s) {
   return force;
 }
 
-PlantSettings bench_arm(PlantKind kind, MassModel mass, int pieces) {
+PlantSettings bench_arm(const PlantKind& kind, MassModel mass) {
   PlantSettings settings;
-  const int n = kind == PlantKind::links ? 4 : 3;
   settings.kind = kind;
   settings.arm.mass = mass;
-  settings.arm.segments.assign(static_cast<std::size_t>(n), SegmentParameters{});
-  if (kind == PlantKind::links) {  // the arm of section VI
-    settings.arm.segments.assign(static_cast<std::size_t>(n), {.length_m = 0.25,
-                                                               .mass_kg = 0.25,
-                                                               .stiffness_nm_per_rad = 2.0,
-                                                               .damping_nms_per_rad = 0.5});
+  settings.arm.segments.assign(3, SegmentParameters{});
+  if (kind.get_if<LinkSettings>() != nullptr) {
+    settings.arm.segments.assign(4, {.length_m = 0.25,
+                                     .mass_kg = 0.25,
+                                     .stiffness_nm_per_rad = 2.0,
+                                     .damping_nms_per_rad = 0.5});
   }
-  settings.refined.pieces = settings.links.links_per_segment = pieces;
   return settings;
 }
 
 std::vector<BenchPlant> bench_plants() {
-  return {{"pcc point", bench_arm(PlantKind::pcc, MassModel::point, 1)},
-          {"pcc distributed", bench_arm(PlantKind::pcc, MassModel::distributed, 1)},
-          {"refined 3x8", bench_arm(PlantKind::refined, MassModel::distributed, 8)},
-          {"links 4x6", bench_arm(PlantKind::links, MassModel::distributed, 6)}};
+  return {{"pcc point", bench_arm(PccSettings{}, MassModel::point)},
+          {"pcc distributed", bench_arm(PccSettings{}, MassModel::distributed)},
+          {"refined 3x8", bench_arm(RefinedSettings{}, MassModel::distributed)},
+          {"links 4x6", bench_arm(LinkSettings{}, MassModel::distributed)}};
 }
 
 PlantRun run_plant(const PlantSettings& settings, Scene scene, const Trial& trial,

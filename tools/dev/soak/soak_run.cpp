@@ -59,7 +59,7 @@ SoakRun::SoakRun(const SoakOptions& options)
   if (experiment_.actuation.kind == ActuationKind::torque)
     throw ConfigError(options.config, 0, "actuation.kind",
                       "chambers: a soak watches pressures and valves", "torque");
-  if (experiment_.transport.mocap.source != MocapSourceKind::softarm)
+  if (experiment_.transport.mocap.source != softarm_mocap())
     throw ConfigError(options.config, 0, "daemon.mocap.source",
                       "softarm, the only frames that a soak can spoil", "another source");
   for (const SoakFault& fault : soak_faults()) counters_.faults.push_back({.name = fault.name});

@@ -18,7 +18,7 @@ std::string linear_table(const ParameterSet& set, const LinearFit& fit);
 std::string conditioning_text(const ParameterSet& set, const Refinement& fit);
 std::string coverage_text(const CoverageTable& table);
 
-/// An experiment that includes `config` and has the arm found in place of the one believed; its
+/// An experiment that includes `config` and has the arm found in place of the one configured; its
 /// plant stays as it is. `note` becomes a comment. The path of the include is seen from `output`.
 std::string identified_yaml(const Experiment& experiment, const ArmHypothesis& arm,
                             const FitChoice& choice, const std::string& note,

@@ -28,7 +28,7 @@ struct FitChoice {
   bool per_segment = false;  ///< k and beta of every segment, instead of one for all as in VII-B1
   GainSharing gains = GainSharing::chamber;
   bool gains_free = true;  ///< false: as configured (always with actuation by torque)
-  /// Into which direction a chamber pushes, too. Nothing is believed of its push then: the
+  /// Into which direction a chamber pushes, too. Nothing is configured of its push then: the
   /// configured gain is a scale.
   bool directions = false;
   bool lag = true;
@@ -60,7 +60,7 @@ class ParameterSet {
   }
 
   Eigen::VectorXd of(const ArmHypothesis& arm) const;  ///< over their scales
-  Eigen::VectorXd believed() const { return of(start_); }
+  Eigen::VectorXd configured() const { return of(start_); }
   Eigen::VectorXd lowest() const;  ///< over their scales
   ArmHypothesis arm(const Eigen::VectorXd& x) const;
   /// Whether the arm is one: springs and damping that are not negative, no negative lag.

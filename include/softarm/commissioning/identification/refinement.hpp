@@ -11,7 +11,7 @@ namespace softarm {
 /// How the nonlinear fit searches.
 struct RefinementOptions {
   int most_rounds = 40;
-  /// Standard deviation, in the parameters' scales, of what was believed before; 0: nothing was.
+  /// Standard deviation, in the parameters' scales, of what was configured before; 0: nothing was.
   double prior = 0.0;
   /// false: every component weighs alike, so that the RMS itself is least (without a prior).
   bool weighted = true;

@@ -15,7 +15,7 @@ namespace softarm {
 /// Everything the response depends on.
 struct ArmHypothesis {
   ArmParameters arm;            ///< its stiffness and damping count
-  Eigen::Matrix2Xd push;        ///< column j: generalized force in u of input j a bar (or N m), N m
+  Eigen::Matrix2Xd input_map;   ///< column j: generalized force in u of input j a bar (or N m), N m
   std::vector<int> segment_of;  ///< of every input
   Eigen::VectorXd rest_rad;     ///< 2n: where the springs rest
   double cubic_nm_per_rad3 = 0.0;
@@ -25,7 +25,7 @@ struct ArmHypothesis {
 };
 
 /// What the controller of an experiment believes, with the terms of `identification`.
-ArmHypothesis believed(const Experiment& experiment);
+ArmHypothesis configured(const Experiment& experiment);
 /// What its simulated arm is.
 ArmHypothesis of_plant(const Experiment& experiment);
 

@@ -19,7 +19,7 @@ namespace {
 constexpr double kPositionNoise_m = 0.2e-3;
 constexpr double kOrientationNoise_rad = 3.5e-3;
 
-Eigen::Isometry3d pose_of(const PlateSettings& plate) {
+Eigen::Isometry3d pose_of(const MarkerFrameSettings& plate) {
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
   if (!plate.rotation_rad.isZero(0.0))
     pose.linear() =
@@ -28,8 +28,8 @@ Eigen::Isometry3d pose_of(const PlateSettings& plate) {
   return pose;
 }
 
-PlateSettings plate(const Eigen::Vector3d& position_m, const Eigen::Vector3d& rotation_rad) {
-  PlateSettings out;
+MarkerFrameSettings plate(const Eigen::Vector3d& position_m, const Eigen::Vector3d& rotation_rad) {
+  MarkerFrameSettings out;
   out.position_m = position_m;
   out.rotation_rad = rotation_rad;
   return out;
@@ -68,7 +68,7 @@ class Calibration : public ::testing::Test {
       frame.capture_ns = 5'000'000LL * k;
       frame.segments = 3;
       for (std::size_t i = 0; i < 4; ++i) {
-        const PlateSettings& on = i == 0 ? truth.base_plate : truth.segment_plates[i - 1];
+        const MarkerFrameSettings& on = i == 0 ? truth.base_plate : truth.segment_plates[i - 1];
         Eigen::Isometry3d body = ends[i] * pose_of(on).inverse();
         if (noise > 0.0 && !(i == 0 && truth.base_id < 0)) {
           body.translation() += kPositionNoise_m * vector();
@@ -86,7 +86,8 @@ class Calibration : public ::testing::Test {
   }
 
   /// Distance and angle between two plates.
-  static std::pair<double, double> apart(const PlateSettings& a, const PlateSettings& b) {
+  static std::pair<double, double> apart(const MarkerFrameSettings& a,
+                                         const MarkerFrameSettings& b) {
     const Eigen::Isometry3d between = pose_of(a).inverse() * pose_of(b);
     return {(a.position_m - b.position_m).norm(), Eigen::AngleAxisd(between.linear()).angle()};
   }

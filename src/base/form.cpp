@@ -6,7 +6,7 @@
 #include <numbers>
 #include <utility>
 
-#include "softarm/config/keys.hpp"
+#include "softarm/base/keys.hpp"
 
 namespace softarm {
 namespace {
@@ -125,14 +125,6 @@ std::string_view Key::unit() const {
   const auto at = std::find_if(kUnits.begin(), kUnits.end(),
                                [&](const auto& unit) { return text.ends_with(unit.first); });
   return at == kUnits.end() ? "" : at->second;
-}
-
-std::string Entry::documentation() const {
-  std::string facts;
-  if (kind == Kind::text) facts = "text";
-  if (kind == Kind::numbers) facts = form.text(key.unit(), false);
-  if (key.presence == Presence::required) facts += facts.empty() ? "required" : ", required";
-  return facts.empty() ? key.doc : fmt::format("{} ({})", key.doc, facts);
 }
 
 }  // namespace softarm

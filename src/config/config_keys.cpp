@@ -1,4 +1,4 @@
-#include "softarm/config/keys.hpp"
+#include "softarm/config/config_keys.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -108,7 +108,7 @@ struct NumberReader {
 
 }  // namespace
 
-struct Keys::Frame {
+struct ConfigKeys::Frame {
   const YamlNode* node;
   std::string path;
   std::set<std::string_view> known = {};    ///< keys declared
@@ -139,21 +139,29 @@ struct Keys::Frame {
   }
 };
 
-Keys::Keys(Purpose purpose) : purpose_(purpose) {}
+std::string Entry::documentation() const {
+  std::string facts;
+  if (kind == Kind::text) facts = "text";
+  if (kind == Kind::numbers) facts = form.text(key.unit(), false);
+  if (key.presence == Presence::required) facts += facts.empty() ? "required" : ", required";
+  return facts.empty() ? key.doc : fmt::format("{} ({})", key.doc, facts);
+}
 
-Keys::Keys(const std::filesystem::path& file)
+ConfigKeys::ConfigKeys(Purpose purpose) : purpose_(purpose) {}
+
+ConfigKeys::ConfigKeys(const std::filesystem::path& file)
     : purpose_(Purpose::read), root_(std::make_unique<const YamlNode>(read_yaml_file(file))) {}
 
-Keys::~Keys() = default;
+ConfigKeys::~ConfigKeys() = default;
 
-Entry Keys::visit(const Body& describe) {
+Entry ConfigKeys::visit(const Body& describe) {
   Entry root{{"", ""}, Entry::Kind::section};
   enter(root, root_.get(), "", describe);
   return root;
 }
 
-ConfigError Keys::error_at(const std::string& path, const std::string& expected,
-                           const std::string& got) const {
+ConfigError ConfigKeys::error_at(const std::string& path, const std::string& expected,
+                                 const std::string& got) const {
   Location where = root_->location;
   for (std::string at = path; !at.empty();) {
     if (const auto found = locations_.find(at); found != locations_.end()) {
@@ -166,8 +174,8 @@ ConfigError Keys::error_at(const std::string& path, const std::string& expected,
   return {*where.file, where.line, path, expected, got};
 }
 
-/// The node of a key of the section being read; nullptr if it is left out.
-const YamlNode* Keys::take(const Key& key, const std::string& expected) {
+/// What stands at a key of the section being read; nullptr where it is left out.
+const YamlNode* ConfigKeys::take(const Key& key, const std::string& expected) {
   if (!reading()) return nullptr;
   Frame& frame = frames_.back();
   frame.known.insert(key.name);
@@ -183,8 +191,9 @@ const YamlNode* Keys::take(const Key& key, const std::string& expected) {
   return node;
 }
 
-/// Visits a section, whose keys become the entries of `out`; when reading, the section is `node`.
-void Keys::enter(Entry& out, const YamlNode* node, const std::string& path, const Body& body) {
+/// Visits a section, whose keys become the entries of `out`; reading, that of `node`.
+void ConfigKeys::enter(Entry& out, const YamlNode* node, const std::string& path,
+                       const Body& body) {
   std::vector<Entry>* outer = std::exchange(entries_, &out.entries);
   if (!reading()) {
     body();
@@ -208,7 +217,7 @@ void Keys::enter(Entry& out, const YamlNode* node, const std::string& path, cons
   entries_ = outer;
 }
 
-void Keys::enter_items(Entry& out, const YamlNode* list, int count, const ItemBody& item) {
+void ConfigKeys::enter_items(Entry& out, const YamlNode* list, int count, const ItemBody& item) {
   const std::string path = reading() ? frames_.back().path_of(out.key.name) : "";
   for (int i = 0; i < count; ++i) {
     const YamlNode* node = list;
@@ -223,11 +232,11 @@ void Keys::enter_items(Entry& out, const YamlNode* list, int count, const ItemBo
   }
 }
 
-Entry& Keys::add(const Key& key, Entry::Kind kind) {
+Entry& ConfigKeys::add(const Key& key, Entry::Kind kind) {
   return entries_->emplace_back(Entry{key, kind});
 }
 
-void Keys::when(bool condition, const Body& body) {
+void ConfigKeys::when(bool condition, const Body& body) {
   if (!condition && purpose_ != Purpose::schema) return;
   const std::size_t first = entries_->size();
   body();
@@ -237,8 +246,8 @@ void Keys::when(bool condition, const Body& body) {
   }
 }
 
-void Keys::either(const char* exact, const Body& exact_body, const char* friendly,
-                  const Body& friendly_body) {
+void ConfigKeys::either(const char* exact, const Body& exact_body, const char* friendly,
+                        const Body& friendly_body) {
   bool as_exact = purpose_ == Purpose::print;
   if (reading()) {
     const Frame& frame = frames_.back();
@@ -253,7 +262,7 @@ void Keys::either(const char* exact, const Body& exact_body, const char* friendl
   when(!as_exact, friendly_body);
 }
 
-void Keys::visit_numbers(const Key& key, const Form& form, std::vector<double>& numbers) {
+void ConfigKeys::visit_numbers(const Key& key, const Form& form, std::vector<double>& numbers) {
   const std::string expected = form.text(key.unit());
   if (const YamlNode* node = take(key, expected)) {
     const std::string path = frames_.back().path_of(key.name);
@@ -270,9 +279,7 @@ void Keys::visit_numbers(const Key& key, const Form& form, std::vector<double>& 
   entry.numbers = numbers;
 }
 
-void Keys::operator()(const char* name, std::string& value, const Form& length, const char* doc,
-                      Presence presence) {
-  const Key key{name, doc, presence};
+void ConfigKeys::visit_text(const Key& key, const Form& length, std::string& value) {
   const std::string expected =
       fmt::format("a text of {} to {} printable characters", length.low, length.high);
   if (const YamlNode* node = take(key, expected)) {
@@ -281,7 +288,7 @@ void Keys::operator()(const char* name, std::string& value, const Form& length, 
     });
     if (node->kind != YamlNode::Kind::scalar || !printable ||
         !length.contains(static_cast<double>(node->text.size())))
-      fail(*node, frames_.back().path_of(name), expected);
+      fail(*node, frames_.back().path_of(key.name), expected);
     value = node->text;
   }
   Entry& entry = add(key, Entry::Kind::text);
@@ -289,7 +296,7 @@ void Keys::operator()(const char* name, std::string& value, const Form& length, 
   entry.text = value;
 }
 
-void Keys::section(const Key& key, const Body& body) {
+void ConfigKeys::section(const Key& key, const Body& body) {
   const YamlNode* node = take(key, "a section");
   Entry& entry = add(key, Entry::Kind::section);
   if (!reading()) return enter(entry, nullptr, "", body);
@@ -306,7 +313,8 @@ void Keys::section(const Key& key, const Body& body) {
   enter(entry, node != nullptr ? node : &empty, frame.path_of(key.name), body);
 }
 
-void Keys::visit_list(const Key& key, int size, const ItemBody& resize, const ItemBody& item) {
+void ConfigKeys::visit_list(const Key& key, int size, const ItemBody& resize,
+                            const ItemBody& item) {
   const YamlNode* node = take(key, "a list of sections");
   if (node != nullptr) {
     const std::size_t count = node->items.size();
@@ -320,7 +328,8 @@ void Keys::visit_list(const Key& key, int size, const ItemBody& resize, const It
   if (node != nullptr || !reading()) enter_items(add(key, Entry::Kind::list), node, size, item);
 }
 
-void Keys::visit_one_or_each(const Key& key, int count, bool all_equal, const ItemBody& item) {
+void ConfigKeys::visit_one_or_each(const Key& key, int count, bool all_equal,
+                                   const ItemBody& item) {
   const YamlNode* node = take(key, "a section");
   const bool one = node != nullptr && node->kind == YamlNode::Kind::map;
   if (node != nullptr && !one &&

@@ -1,13 +1,11 @@
-// One declaration per key of a YAML document. It reads, prints, documents (template.yaml) and
-// describes the key to editors (JSON Schema):
+// One declaration a key of a YAML document. It reads, prints, documents (template.yaml) and
+// describes the key to editors (JSON Schema), whoever visits it (config/config_keys.hpp):
 //
 //   void describe(Keys& key, Motor& it) {
 //     key("speed_radps", it.speed_radps, above(0, 100), "of the shaft");
 //     key("mode", it.mode, one_of({"idle", "running"}), "at the start");  // an enum, in its order
 //     key("limits", it.limits, "that stop it");  // a section: describe(key, it.limits)
 //   }
-//   Keys keys("motor.yaml");
-//   keys.visit([&] { describe(keys, motor); });
 //
 // The default of a key that may be left out is what the variable holds before the visit. A name
 // ends in its unit (speed_radps); what is printed as unit is taken from there.
@@ -15,28 +13,16 @@
 
 #include <Eigen/Core>
 #include <algorithm>
-#include <filesystem>
 #include <functional>
-#include <map>
-#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <type_traits>
 #include <vector>
 
-#include "softarm/config/config_error.hpp"
-#include "softarm/config/form.hpp"
+#include "softarm/base/form.hpp"
 
 namespace softarm {
-
-struct YamlNode;
-
-/// A location in a file.
-struct Location {
-  std::shared_ptr<const std::string> file;
-  int line = 0;  ///< 1-based
-};
 
 /// Whether a key may be left out.
 enum class Presence { optional, required };
@@ -58,56 +44,18 @@ struct Key {
   std::string_view unit() const;  ///< from the suffix of the name; "" if it has none
 };
 
-/// A key with its value, as it was visited.
-struct Entry {
-  /// Type of the value.
-  enum class Kind { numbers, text, section, list, one_or_each };
-  Key key;
-  Kind kind;
-  Form form = {};
-  std::vector<double> numbers = {};
-  std::string text = {};
-  std::vector<Entry> entries = {};  ///< keys of a section, or items, each a section
-  bool conditional = false;         ///< exists only under a condition ...
-  bool in_force = true;             ///< ... which is true
-
-  /// Whether the key must be in every file.
-  bool required() const { return key.presence == Presence::required && !conditional; }
-  /// "nominal, of the motion capture (a number in (0, 10] s)".
-  std::string documentation() const;
-};
-
-/// Visits declarations for one purpose.
+/// Who visits declarations.
 class Keys {
  public:
-  /// The purpose of a visit.
-  enum class Purpose {
-    read,      ///< fill variables from a file
-    print,     ///< print variables in the exact form
-    document,  ///< print variables in the readable form
-    schema     ///< list all forms, whatever the conditions
-  };
   using Body = std::function<void()>;
   using ItemBody = std::function<void(int)>;
 
-  /// Visits for any purpose but `read`.
-  explicit Keys(Purpose purpose);
-  /// Reads a file and the files it includes. @throws ConfigError
-  explicit Keys(const std::filesystem::path& file);
-  ~Keys();
+  virtual ~Keys() = default;
 
   int segments = 1;  ///< of the arm, for keys after `arm.segments`
 
-  /// Visits the keys that `describe` declares; when reading, refuses all others. Returns a section.
-  /// @throws ConfigError when reading
-  Entry visit(const Body& describe);
-  /// Whether variables are being filled from a file; defaults may then depend on keys read before.
-  bool reading() const { return purpose_ == Purpose::read; }
-  /// Whether the file has a key at this path ("a.b[1].c").
-  bool given(std::string_view path) const { return locations_.find(path) != locations_.end(); }
-  /// An error at a path, located at the nearest enclosing section that is in the file.
-  ConfigError error_at(const std::string& path, const std::string& expected,
-                       const std::string& got) const;
+  /// Whether variables are being filled: then defaults may follow what was read before.
+  virtual bool reading() const = 0;
 
   /// A number, optional number, enum, Vector3d, rotation, or vector of numbers.
   template <typename T>
@@ -123,7 +71,9 @@ class Keys {
   }
   /// `length` of the text, in characters.
   void operator()(const char* name, std::string& value, const Form& length, const char* doc,
-                  Presence presence = Presence::optional);
+                  Presence presence = Presence::optional) {
+    visit_text({name, doc, presence}, length, value);
+  }
   /// A section whose keys `describe(key, section)` declares.
   template <typename T>
   requires std::is_class_v<T>
@@ -131,8 +81,7 @@ class Keys {
                   SectionKind kind = SectionKind::plain) {
     section({name, doc, Presence::optional, kind}, [&] { describe(*this, value); });
   }
-  /// A section whose keys `body` visits.
-  void section(const Key& key, const Body& body);
+  virtual void section(const Key& key, const Body& body) = 0;
   /// A list of sections.
   template <typename Item, typename Describe>
   void list(const Key& key, std::vector<Item>& items, const Describe& describe_item) {
@@ -149,22 +98,19 @@ class Keys {
     visit_one_or_each(key, static_cast<int>(items.size()), all_equal,
                       [&](int i) { describe_item(items[static_cast<std::size_t>(i)]); });
   }
-  /// Keys that exist only under a condition.
-  void when(bool condition, const Body& body);
-  /// Two alternative forms of the same value: a file may have one of them.
-  void either(const char* exact, const Body& exact_body, const char* friendly,
-              const Body& friendly_body);
+  /// Keys that are there under a condition only.
+  virtual void when(bool condition, const Body& body) = 0;
+  /// Two ways to say the same.
+  virtual void either(const char* exact, const Body& exact_body, const char* friendly,
+                      const Body& friendly_body) = 0;
 
  private:
-  struct Frame;  ///< a section being read
-
-  Entry& add(const Key& key, Entry::Kind kind);
-  void visit_numbers(const Key& key, const Form& form, std::vector<double>& numbers);
-  void visit_list(const Key& key, int size, const ItemBody& resize, const ItemBody& item);
-  void visit_one_or_each(const Key& key, int count, bool all_equal, const ItemBody& item);
-  const YamlNode* take(const Key& key, const std::string& expected);
-  void enter(Entry& out, const YamlNode* node, const std::string& path, const Body& body);
-  void enter_items(Entry& out, const YamlNode* list, int count, const ItemBody& item);
+  virtual void visit_numbers(const Key& key, const Form& form, std::vector<double>& numbers) = 0;
+  virtual void visit_text(const Key& key, const Form& length, std::string& value) = 0;
+  virtual void visit_list(const Key& key, int size, const ItemBody& resize,
+                          const ItemBody& item) = 0;
+  virtual void visit_one_or_each(const Key& key, int count, bool all_equal,
+                                 const ItemBody& item) = 0;
 
   /// The numbers of a value, matrices row by row.
   template <typename T>
@@ -200,12 +146,6 @@ class Keys {
                      [](double x) { return static_cast<typename T::value_type>(x); });
     }
   }
-
-  Purpose purpose_;
-  std::vector<Entry>* entries_ = nullptr;  ///< of the section being visited
-  std::unique_ptr<const YamlNode> root_;   ///< of the file that is read
-  std::vector<Frame> frames_;
-  std::map<std::string, Location, std::less<>> locations_;  ///< of every key read
 };
 
 }  // namespace softarm

@@ -2,13 +2,13 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <algorithm>
 #include <cmath>
 
-#include "simulation/second_order_system.hpp"
-#include "softarm/simulation/valves.hpp"
+#include "softarm/simulation/second_order_system.hpp"
 
 namespace softarm {
+
+class Valves;
 
 /// The generalized force A_chamber tau_A of every segment (2n, N m), decaying exponentially from
 /// one value to another as pressures behind valves do.
@@ -31,24 +31,10 @@ class ActuatorInput {
 
   /// From t_s on: `map` times the pressures that `valves`, as they stand then, come to. Both
   /// outlive this and do not change until the next call.
-  void follow(double t_s, const Valves& valves, const Eigen::MatrixXd& map) {
-    valves_ = &valves;
-    map_ = &map;
-    pressures_bar_.resize(valves.size());
-    since_s_ = t_s;
-    known_ = false;
-  }
+  void follow(double t_s, const Valves& valves, const Eigen::MatrixXd& map);
 
   const Eigen::VectorXd& force_nm(double t_s) {
-    if (valves_ != nullptr) {
-      if (!known_ || t_s != time_s_) {
-        valves_->after(std::max(0.0, t_s - since_s_), pressures_bar_);
-        force_nm_.noalias() = *map_ * pressures_bar_;
-        time_s_ = t_s;
-        known_ = true;
-      }
-      return force_nm_;
-    }
+    if (valves_ != nullptr) return force_of_valves_nm(t_s);
     if (!known_ || (rate_per_s_ > 0.0 && t_s != time_s_)) {
       force_nm_ = target_nm_;
       if (rate_per_s_ > 0.0) {
@@ -67,6 +53,8 @@ class ActuatorInput {
   }
 
  private:
+  const Eigen::VectorXd& force_of_valves_nm(double t_s);
+
   Eigen::VectorXd target_nm_, excess_nm_;
   Eigen::VectorXd force_nm_;        // at time_s_
   const Valves* valves_ = nullptr;  // where they have a slew limit

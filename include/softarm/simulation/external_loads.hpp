@@ -5,9 +5,33 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "softarm/simulation/settings.hpp"
-
 namespace softarm {
+
+struct PlantSettings;
+
+/// How an external load changes in time.
+enum class LoadShape {
+  constant,  ///< switched on and off
+  half_sine  ///< a blow: half a sine wave over the duration
+};
+
+/// A force and a moment on the end of a segment, in world axes.
+struct ExternalLoad {
+  int segment = 0;  ///< 1..n from the base; 0: the tip
+  Eigen::Vector3d force_n = Eigen::Vector3d::Zero();
+  Eigen::Vector3d moment_nm = Eigen::Vector3d::Zero();
+  LoadShape shape = LoadShape::constant;
+  double start_s = 0.0;
+  double duration_s = 0.0;
+};
+
+/// A base that is carried to and fro, without turning: base_position + amplitude sin(2 pi frequency
+/// t + phase).
+struct BaseMotion {
+  Eigen::Vector3d amplitude_m = Eigen::Vector3d::Zero();  ///< world axes
+  double frequency_hz = 0.0;
+  double phase_rad = 0.0;
+};
 
 /// External loads and the motion of the base, as functions of time. Loads begin and end at known
 /// instants; the integrator must stop there, so that it can neither step over a short blow nor see
