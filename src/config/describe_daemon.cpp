@@ -98,7 +98,7 @@ void describe_reference(Keys& key, ReferenceSettings& it) {
     if (key.reading()) phase.kind = kinds[static_cast<std::size_t>(kind)].empty;
     key.when(&phase != &it.phases.back(), [&] {
       key("duration_s", phase.duration_s, above(0, kMany),
-          "of the phase; the last one lasts for ever and has none", kRequired);
+          "of the phase; the last one has none and does not end", kRequired);
     });
     std::visit([&](auto& reference) { describe(key, reference); }, phase.kind);
   });
@@ -222,12 +222,12 @@ void describe_daemon(Keys& key, Experiment& it) {
   key("capture_time", transport.capture_time, one_of({"sender", "latency"}),
       "sender: its clock, related to ours; latency: arrival minus frame_latency_s");
   KEY(safety, "thresholds of the safety monitor");
-  key.section({"mocap", "who sends frames, and what the numbers mean"},
+  key.section({"mocap", "the sender of frames, and its conventions"},
               [&] { describe_mocap(key, transport); });
   const bool named = transport.mocap.source == MocapSourceKind::rigid_transform;
   key.section({"bodies", "which bodies of a frame carry the base and the segments' ends"},
               [&] { describe_bodies(key, transport.bodies, named); });
-  KEY(realtime, "the daemon's place on the machine");
+  KEY(realtime, "scheduling and memory of the daemon");
   key.section({"lcm", "channels, distinct where two arms share a machine"},
               [&] { describe_lcm(key, transport.lcm, it.safety); });
 }
