@@ -17,7 +17,7 @@ void describe_reference(Keys& key, ReferenceSettings& it) {
     if (key.reading()) phase.kind = reference_kinds().all()[kind];
     key.when(&phase != &it.phases.back(), [&] {
       key("duration_s", phase.duration_s, above(0, kMany),
-          "of the phase; the last one lasts for ever and has none", kRequired);
+          "of the phase; the last one has none and does not end", kRequired);
     });
     phase.kind.describe(key);
   });
@@ -142,12 +142,12 @@ void describe_daemon(Keys& key, Experiment& it) {
   key("capture_time", transport.capture_time, one_of({"sender", "latency"}),
       "sender: its clock, related to ours; latency: arrival minus frame_latency_s");
   KEY(safety, "thresholds of the safety monitor");
-  key.section({"mocap", "who sends frames, and what the numbers mean"},
+  key.section({"mocap", "the sender of frames, and its conventions"},
               [&] { describe_mocap(key, transport); });
   const bool named = transport.mocap.source.channel_per_body;
   key.section({"bodies", "which bodies of a frame carry the base and the segments' ends"},
               [&] { describe_bodies(key, transport.bodies, named); });
-  KEY(realtime, "the daemon's place on the machine");
+  KEY(realtime, "scheduling and memory of the daemon");
   key.section({"lcm", "channels, distinct where two arms share a machine"},
               [&] { describe_lcm(key, transport.lcm, it.safety); });
 }

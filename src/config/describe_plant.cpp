@@ -40,13 +40,13 @@ static void describe(Keys& key, ValveSettings& it) {
 }
 
 static void describe(Keys& key, ExternalLoad& it) {
-  KEY(segment, from(0, kMaxSegments), "on whose end it acts; 0: the tip");
+  KEY(segment, from(0, kMaxSegments), "it acts on the end of this segment; 0: the tip");
   KEY(force_n, from(-1e6, 1e6), "world frame");
   KEY(moment_nm, from(-1e6, 1e6), "world frame");
   KEY(shape, one_of({"constant", "half_sine"}),
       "constant, or a blow: half a sine over the duration");
   KEY(start_s, from(0, kMany), "when it begins");
-  KEY(duration_s, from(0, kMany), "0: for ever (a constant load only)");
+  KEY(duration_s, from(0, kMany), "0: unlimited (a constant load only)");
 }
 
 static void describe(Keys& key, BaseMotion& it) {

@@ -11,7 +11,7 @@ static void describe(Keys& key, RegisterMap& it) {
   KEY(write_address, address, "of the first slot's set points, as the protocol counts");
   KEY(write_words, words, "of a slot");
   KEY(set_point_word, place, "in the slot, of its first valve");
-  KEY(valves_per_slot, from(1, 64), "whose words stand side by side");
+  KEY(valves_per_slot, from(1, 64), "number of valves, their words adjacent");
   KEY(control_word, place_or_none, "in the slot, or none");
   KEY(control_value, bits, "written there in every cycle: regulate pressure");
   KEY(read_address, address, "of the first slot's measured pressures");
@@ -38,7 +38,7 @@ void describe(Keys& key, ValveDriverSettings& it) {
   KEY(unit_id, from(0, 255), "of the terminal behind the port");
   KEY(order, from(0, 65535).each(), "valve of every chamber, from 0; left out: 0, 1, 2, ...");
   KEY(terminal, one_of(kTerminalNames),
-      "whose registers are meant; none of them was tried on hardware; free: a plain map");
+      "preset of the registers, none tested on hardware; free: a plain map");
   if (key.reading()) it.registers = register_preset(it.terminal);
   KEY(registers, "left out: those of the terminal", SectionKind::hint);
   KEY(rate_hz, from(1, 2000), "one block write and one block read each");

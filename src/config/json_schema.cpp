@@ -136,7 +136,7 @@ std::string json_schema_text(const Entry& root) {
   schema["properties"]["include"] = {
       {"type", "string"},
       {"minLength", 1},
-      {"description", "a file, relative to this one, whose keys hold where this one has none"}};
+      {"description", "a file, relative to this one, with the keys that this one leaves out"}};
   const std::string factor = R"(\+?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?)";
   schema["definitions"]["multiple_of_pi"] = {
       {"type", "string"}, {"pattern", "^[-+]?(" + factor + R"(\*)?pi(/)" + factor + ")?$"}};

@@ -78,11 +78,11 @@ std::string template_text() {
   constexpr const char* kHeader = R"(# yaml-language-server: $schema=experiment.schema.json
 # Every key of an experiment, with its meaning, type, range and unit. Printed by `softarm check --template`.
 #
-# A key that is not marked as required may be left out and then has the value shown here, or what its text says. Unknown
+# A key that is not marked as required may be left out and then has the value shown here, or that of its text. Unknown
 # and repeated keys, wrong types and values out of range are refused. Angles are radians and may be written as multiples
-# of pi: pi/2, -pi, 3*pi/4, 0.2*pi/180. `include: FILE` (relative to this file) takes over what FILE says; what stands
-# here wins, key by key. Editors with a YAML language server complete and check a file whose first line names the schema,
-# as that of this one does: `softarm check --schema > experiment.schema.json`.
+# of pi: pi/2, -pi, 3*pi/4, 0.2*pi/180. `include: FILE` (relative to this file) takes over the keys of FILE; those
+# of this file win, key by key. Editors with a YAML language server complete and check a file whose first line names the
+# schema, as in this file: `softarm check --schema > experiment.schema.json`.
 
 )";
   return kHeader + yaml_text(entries_of(example_experiment(), ConfigKeys::Purpose::document), true);

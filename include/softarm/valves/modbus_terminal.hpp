@@ -27,7 +27,7 @@ class ModbusTerminal {
   bool connect() noexcept;
   /// Closes the connection, if it is open.
   void close() noexcept;
-  /// Whether it is connected; a broken connection is closed.
+  /// Whether `connect` succeeded and `close` was not called since.
   bool is_open() const noexcept { return open_; }
 
   /// Writes holding registers from `address` on.
