@@ -8,7 +8,7 @@ int main(int count, char** arguments) try {
   if (count != 3) throw std::invalid_argument("usage: example_identify CONFIG LOG");
   const softarm::Experiment experiment = softarm::load_experiment(arguments[1]);
   const softarm::MotionRecord record =
-      softarm::read_log(experiment, arguments[2], softarm::LoggedInput::commanded);
+      softarm::read_log(experiment, arguments[2], softarm::LoggedInput::commanded).record;
   const softarm::ParameterSet set(softarm::believed(experiment), experiment.actuation.kind, {});
   const softarm::Refinement fit = softarm::identify(set, record, {});
   for (Eigen::Index i = 0; i < set.size(); ++i)

@@ -122,7 +122,8 @@ static void describe(Keys& key, ControllerSettings& it) {
   key("kd_nms_per_rad", it.kd, from(0, 1e3).one_or_pairs(), "K_D, in the same forms");
   key("ki_nm_per_rad_s", it.ki, gains, "integral gain on u, in the same forms; not in the paper");
   KEY(valve_lag_s, from(0, 5), "first-order lag inverted on what depends on the reference alone");
-  KEY(delay_s, from(0, 5), "dead time of valves and tubes, for the check of gains at load time");
+  key("delay_s", it.dead_time_s, from(0, 5),
+      "dead time of valves and tubes, for the check of gains at load time");
   KEY(max_theta_rad, above(0, kTwoPi), "soft limit on theta of reference and arm");
   KEY(max_speed_radps, above(0, 1e4), "soft limit on |u'| of reference and arm, a segment");
   KEY(max_step_rad, above(0, kTwoPi), "a larger jump of a live reference is refused");
@@ -147,7 +148,7 @@ static void describe(Keys& key, IdentificationSettings& it) {
       "where the springs rest, to predict a recorded motion; the controller does not know it");
   KEY(cubic_nm_per_rad3, from(-1e4, 1e4), "likewise: adds c |u - rest|^2 (u - rest) to K u");
   KEY(lag_s, from(0, 100), "first order, from set point to pressure, likewise");
-  KEY(delay_s, from(-1, 100), "from set point to frame, likewise");
+  key("delay_s", it.dead_time_s, from(-1, 100), "from set point to frame, likewise");
 }
 
 void describe(Keys& key, Experiment& it) {

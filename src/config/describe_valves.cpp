@@ -31,7 +31,7 @@ static void describe(Keys& key, RegisterMap& it) {
 }
 
 void describe(Keys& key, ValveDriverSettings& it) {
-  KEY(backend, from(1, 63), "who drives the valves: modbus, or one of a program of your own");
+  KEY(backend, from(1, 63), "what drives the valves: modbus, or the back end of another program");
   KEY(device, from(0, 255), "what a back end opens that is not on a network");
   KEY(host, from(7, 15), "IPv4 address of the terminal");
   KEY(port, from(1, 65535), "of Modbus TCP");

@@ -76,7 +76,7 @@ LoopSampling sampling_of(const Experiment& experiment) {
           .frame_period_s = safety.frame_period_s,
           .frame_latency_s = safety.frame_latency_s,
           .filter_bandwidth_radps = experiment.estimation.filter_bandwidth_radps,
-          .dead_time_s = experiment.control.delay_s,
+          .dead_time_s = experiment.control.dead_time_s,
           .valve_lag_s = experiment.control.valve_lag_s};
 }
 

@@ -3,16 +3,15 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <stdexcept>
 
+#include "control/blend.hpp"
 #include "softarm/control/reference_kinds.hpp"
+#include "softarm/control/settings.hpp"
 
 namespace softarm {
 namespace {
 
 using std::numbers::pi;
-
-constexpr double kQuinticPeakSpeed = 1.875;  ///< of a minimum-jerk motion over its mean speed
 
 void rest_at(const std::vector<double>& u_rad, ReferenceSample& out) noexcept {
   for (Eigen::Index i = 0; i < out.u.size(); ++i) out.u[i] = u_rad[static_cast<std::size_t>(i)];
@@ -37,24 +36,25 @@ double largest_distance(const std::vector<double>& a, const std::vector<double>&
   return distance;
 }
 
-void check_u(const std::string& where, const std::vector<double>& u_rad, int segments) {
-  if (u_rad.size() != static_cast<std::size_t>(2 * segments)) {
-    throw std::invalid_argument(fmt::format("{}: expected u of {} numbers (2 a segment), got {}",
-                                            where, 2 * segments, u_rad.size()));
-  }
-  for (double value : u_rad) {
-    if (!std::isfinite(value)) {
-      throw std::invalid_argument(fmt::format("{}: expected finite u, got {}", where, value));
-    }
-  }
+void check_u(const ReferencePlace& place, const std::vector<double>& u_rad,
+             const ControllerSettings& control, int segments) {
+  place.require(u_rad.size() == static_cast<std::size_t>(2 * segments),
+                fmt::format("u of {} numbers (2 a segment)", 2 * segments),
+                fmt::format("{}", u_rad.size()));
+  for (const double value : u_rad) place.require_finite({value});
+  const double theta = largest_theta(u_rad);
+  place.require(theta <= control.max_theta_rad,
+                fmt::format("theta within control.max_theta_rad ({} rad)", control.max_theta_rad),
+                fmt::format("{:.6g} rad", theta));
 }
 
 }  // namespace
 
 void SetPointReference::describe(Keys& key) { describe_pose(key, u_rad, Presence::required); }
 
-void SetPointReference::check(const std::string& where, int segments) const {
-  check_u(where, u_rad, segments);
+void SetPointReference::check(const ReferencePlace& place, const ControllerSettings& control,
+                              int segments) const {
+  check_u(place, u_rad, control, segments);
 }
 
 double SetPointReference::largest_theta_rad() const noexcept { return largest_theta(u_rad); }
@@ -73,18 +73,16 @@ void PaperReference::describe(Keys& key) {
   key("phase_step_rad", phase_step_rad, from(-2 * pi, 2 * pi), "phase from segment to segment");
 }
 
-void PaperReference::check(const std::string& where, int) const {
-  for (double value :
-       {theta_rad, rise_s, phi_centre_rad, phi_amplitude_rad, rate_radps, phase_step_rad}) {
-    if (!std::isfinite(value)) {
-      throw std::invalid_argument(fmt::format("{}: expected finite numbers, got {}", where, value));
-    }
-  }
-  if (theta_rad < 0.0 || rise_s < 0.0) {
-    throw std::invalid_argument(
-        fmt::format("{}: expected theta (rad) and rise time (s) >= 0, got {} and {}", where,
-                    theta_rad, rise_s));
-  }
+void PaperReference::check(const ReferencePlace& place, const ControllerSettings& control,
+                           int) const {
+  place.require_finite(
+      {theta_rad, rise_s, phi_centre_rad, phi_amplitude_rad, rate_radps, phase_step_rad});
+  place.require(theta_rad >= 0.0 && rise_s >= 0.0, "theta (rad) and rise time (s) >= 0",
+                fmt::format("{} and {}", theta_rad, rise_s));
+  ReferencePlace{place.phase, ".theta_rad"}.require(
+      theta_rad <= control.max_theta_rad,
+      fmt::format("at most control.max_theta_rad ({} rad)", control.max_theta_rad),
+      fmt::format("{} rad", theta_rad));
 }
 
 double PaperReference::largest_speed_radps() const noexcept {
@@ -137,25 +135,25 @@ void WayPointReference::describe(Keys& key) {
   });
 }
 
-void WayPointReference::check(const std::string& where, int segments) const {
-  if (points.empty()) {
-    throw std::invalid_argument(where + ": expected at least one way point, got none");
-  }
+void WayPointReference::check(const ReferencePlace& place, const ControllerSettings& control,
+                              int segments) const {
+  place.require(!points.empty(), "at least one way point", "none");
   for (std::size_t i = 0; i < points.size(); ++i) {
-    const WayPoint& point = points[i];
-    check_u(fmt::format("{}, way point {}", where, i + 1), point.u_rad, segments);
-    const double after = i == 0 ? -1e-300 : points[i - 1].time_s;
-    if (!std::isfinite(point.time_s) || !(point.time_s > after)) {
-      throw std::invalid_argument(
-          fmt::format("{}, way point {}: expected a time (s) >= 0 and after the one before, got {}",
-                      where, i + 1, point.time_s));
-    }
+    const double time_s = points[i].time_s;
+    const ReferencePlace point{place.phase, fmt::format(".points[{}]", i)};
+    check_u(point, points[i].u_rad, control, segments);
+    const ReferencePlace time{place.phase, point.at + ".time_s"};
+    time.require_finite({time_s});
+    time.require(time_s >= 0.0, "at least 0 s", fmt::format("{} s", time_s));
+    time.require(i == 0 || time_s > points[i - 1].time_s, "later than the point before",
+                 fmt::format("{} s", time_s));
   }
-  if (repeat &&
-      (points.size() < 2 || largest_distance(points.front().u_rad, points.back().u_rad) > 1e-9)) {
-    throw std::invalid_argument(
-        where + ": expected the last way point to equal the first, since they repeat");
-  }
+  if (!repeat) return;
+  const ReferencePlace list{place.phase, ".points"};
+  list.require(points.size() >= 2, "at least 2 points to repeat", fmt::format("{}", points.size()));
+  const double apart = largest_distance(points.front().u_rad, points.back().u_rad);
+  list.require(apart <= 1e-9, "the last way point to equal the first, since they repeat",
+               fmt::format("one {:.3g} rad away", apart));
 }
 
 double WayPointReference::largest_theta_rad() const noexcept {
@@ -201,11 +199,9 @@ void LiveReference::describe(Keys& key) {
   key("timeout_s", timeout_s, above(0, 1e3), "silence after which the last u is held at rest");
 }
 
-void LiveReference::check(const std::string& where, int) const {
-  if (!std::isfinite(timeout_s) || timeout_s < 0.0) {
-    throw std::invalid_argument(
-        fmt::format("{}: expected a timeout (s) >= 0, got {}", where, timeout_s));
-  }
+void LiveReference::check(const ReferencePlace& place, const ControllerSettings&, int) const {
+  place.require(std::isfinite(timeout_s) && timeout_s >= 0.0, "a timeout (s) >= 0",
+                fmt::format("{}", timeout_s));
 }
 
 }  // namespace softarm

@@ -15,7 +15,6 @@
 namespace softarm {
 namespace {
 
-constexpr double kQuinticPeakSpeed = 1.875;
 constexpr double kShortestLive = 0.05;  ///< s, for a live reference that is corrected a little
 
 double largest_norm(const SegmentVector& v) noexcept {
@@ -35,21 +34,17 @@ void resize(ReferenceSample& sample, int dof) noexcept {
   sample.has_tip = false;
 }
 
-void check_phase(const std::string& where, const ReferenceKind& kind,
-                 const ControllerSettings& control, int segments) {
-  kind.check(where, segments);
-  const double theta = kind.largest_theta_rad(), speed = kind.largest_speed_radps();
-  if (theta > control.max_theta_rad) {
-    throw std::invalid_argument(
-        fmt::format("{}: expected theta within max_theta_rad = {} rad, got {:.4g}", where,
-                    control.max_theta_rad, theta));
-  }
-  if (speed > control.max_speed_radps) {
-    throw std::invalid_argument(
-        fmt::format("{}: expected speeds within max_speed_radps = {} rad/s, got up to {:.4g}; give "
-                    "it more time",
-                    where, control.max_speed_radps, speed));
-  }
+void check_phase(int phase, const ReferenceKind& kind, const ControllerSettings& control,
+                 int segments) {
+  const ReferencePlace place{phase};
+  kind.check(place, control, segments);
+  place.require(kind.largest_theta_rad() <= control.max_theta_rad,
+                fmt::format("theta within control.max_theta_rad ({} rad)", control.max_theta_rad),
+                fmt::format("up to {:.6g} rad", kind.largest_theta_rad()));
+  place.require(
+      kind.largest_speed_radps() <= control.max_speed_radps,
+      fmt::format("speeds within control.max_speed_radps ({} rad/s)", control.max_speed_radps),
+      fmt::format("up to {:.4g} rad/s; give it more time", kind.largest_speed_radps()));
 }
 
 }  // namespace
@@ -250,12 +245,11 @@ Reference::Reference(const ReferenceSettings& settings, const ControllerSettings
   double begin = 0.0;
   for (std::size_t i = 0; i < settings.phases.size(); ++i) {
     const ReferencePhase& phase = settings.phases[i];
-    const std::string where = fmt::format("reference, phase {}", i + 1);
-    check_phase(where, phase.kind, control, segments);
+    check_phase(static_cast<int>(i), phase.kind, control, segments);
     const bool last = i + 1 == settings.phases.size();
     if (!last && !(std::isfinite(phase.duration_s) && phase.duration_s > 0.0)) {
-      throw std::invalid_argument(
-          fmt::format("{}: expected a duration (s) > 0, got {}", where, phase.duration_s));
+      throw ReferenceError(static_cast<int>(i), ".duration_s", "a duration (s) > 0",
+                           fmt::format("{}", phase.duration_s));
     }
     State::Phase made;
     made.kind = phase.kind;

@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <stdexcept>
 
 #include "softarm/control/reference_kinds.hpp"
 
@@ -30,11 +29,10 @@ void TipPathReference::describe(Keys& key) {
   key("rate_radps", rate_radps, from(0, 1e3), "of the path");
 }
 
-void TipPathReference::check(const std::string& where, int) const {
-  if (!centre_m.allFinite() || !first_axis_m.allFinite() || !second_axis_m.allFinite() ||
-      !std::isfinite(rate_radps)) {
-    throw std::invalid_argument(where + ": expected a path of finite numbers, got one that is not");
-  }
+void TipPathReference::check(const ReferencePlace& place, const ControllerSettings&, int) const {
+  place.require(centre_m.allFinite() && first_axis_m.allFinite() && second_axis_m.allFinite() &&
+                    std::isfinite(rate_radps),
+                "a path of finite numbers", "one that is not");
 }
 
 TipReference TipPathReference::tip(double time_s) const noexcept {

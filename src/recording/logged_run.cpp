@@ -15,11 +15,7 @@ LoggedRun::LoggedRun(const Experiment& experiment, const std::filesystem::path& 
     : experiment_(experiment),
       pipeline_(experiment),
       mocap_(experiment.transport, experiment.safety, experiment.arm),
-      file_(log, std::ios::binary),
-      log_(file_) {
-  if (!file_)
-    throw std::runtime_error(fmt::format(
-        "cannot read {}: is it an LCM log (softarm import, lcm-logger)?", log.string()));
+      log_(log) {
   if (!read_frame())
     throw std::runtime_error(fmt::format(
         "{} holds no frame on channel {}; daemon.lcm.mocap_channel says which to look for",
@@ -31,12 +27,13 @@ bool LoggedRun::read_frame() {
   for (LogEvent event; log_.next(event);) {
     const auto channel = mocap_.find(event.channel);
     if (!channel) continue;
-    if (event.time_us < 0 || !is_time_us(event.time_us)) {
+    const auto arrival_ns = event.arrival_ns();
+    if (!arrival_ns) {
       ++malformed_;
       continue;
     }
     // A log written from several sources may step back a little; time here does not.
-    next_arrival_ns_ = std::max(next_arrival_ns_, event.time_us * 1000);
+    next_arrival_ns_ = std::max(next_arrival_ns_, *arrival_ns);
     const MocapReceipt receipt = mocap_.take(*channel, event.data, next_arrival_ns_, next_);
     if (receipt == MocapReceipt::malformed) ++malformed_;
     if (receipt == MocapReceipt::frame) return has_next_ = true;

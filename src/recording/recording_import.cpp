@@ -5,7 +5,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <lcm/lcm-cpp.hpp>
+#include <optional>
 #include <softarm_messages/mocap_frame_t.hpp>
 #include <softarm_messages/pressure_command_t.hpp>
 #include <softarm_messages/pressure_measurement_t.hpp>
@@ -13,7 +13,9 @@
 
 #include "softarm/estimation/pose_statistics.hpp"
 #include "softarm/runtime/settings.hpp"
+#include "softarm/transport/event_log.hpp"
 #include "softarm/transport/pose_convention.hpp"
+#include "softarm/transport/settings.hpp"
 
 namespace softarm {
 namespace {
@@ -63,19 +65,13 @@ class Importer {
   }
 
   ImportSummary write(const std::filesystem::path& out) {
-    lcm::LogFile log(out.string(), "w");
-    if (!log.good()) {
-      throw std::runtime_error(
-          fmt::format("{}: expected a file that can be written", out.string()));
-    }
+    EventLogWriter log(out);
     for (std::size_t row = 0; row < table_.rows(); ++row) {
       if (!map_.measured.empty()) append(log, map_.measurement_channel, row, measurement(row));
       if (!map_.commanded.empty()) append(log, map_.command_channel, row, command(row));
       append(log, map_.mocap_channel, row, frame(row));
     }
-    if (std::fflush(log.getFilePtr()) != 0) {
-      throw std::runtime_error(fmt::format("{}: could not be written", out.string()));
-    }
+    log.close();
     summary_.rows = static_cast<std::int64_t>(table_.rows());
     summary_.duration_s = time_s(table_.rows() - 1) - time_s(0);
     return summary_;
@@ -238,16 +234,11 @@ class Importer {
   }
 
   template <class Message>
-  void append(lcm::LogFile& log, const std::string& channel, std::size_t row,
+  void append(EventLogWriter& log, const std::string& channel, std::size_t row,
               const Message& message) {
     bytes_.resize(static_cast<std::size_t>(message.getEncodedSize()));
     message.encode(bytes_.data(), 0, static_cast<int>(bytes_.size()));
-    lcm::LogEvent event{};
-    event.timestamp = time_us(row);
-    event.channel = channel;
-    event.datalen = static_cast<std::int32_t>(bytes_.size());
-    event.data = bytes_.data();
-    if (log.writeEvent(&event) != 0) throw std::runtime_error("the log could not be written");
+    log.write(time_us(row), channel, bytes_);
   }
 
   const RecordingMap& map_;
@@ -256,7 +247,7 @@ class Importer {
   ImportSummary summary_;
   softarm_messages::mocap_frame_t frame_{};
   std::size_t frame_row_ = 0;
-  std::vector<std::uint8_t> bytes_;
+  std::vector<std::byte> bytes_;
 };
 
 }  // namespace

@@ -133,10 +133,7 @@ void ControlPipeline::validate_and_estimate(const TickInput& input, SafetyInput&
   safety.newest_measurement_ns = input.newest_measurement_ns;
   safety.deadman_used = settings_.safety.deadman;
   safety.newest_go_ns = input.newest_go_ns;
-  safety.arm = input.arm;
-  safety.disarm = input.disarm;
-  safety.emergency_stop = input.emergency_stop;
-  safety.shutdown = input.shutdown;
+  safety.requests = input.requests;
   output_.soft_limit = safety.soft_limit_exceeded;
   output_.frame_age_s = newest_capture_ns_ == kNever
                             ? std::numeric_limits<double>::quiet_NaN()

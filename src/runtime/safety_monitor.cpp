@@ -46,9 +46,9 @@ struct Cause {
 /// (consecutive_overruns is zero otherwise): without it they are only counted.
 constexpr std::array kCauses{
     Cause{{Reason::shutdown, Mode::vent, Clearance::never},
-          [](const Evidence& e) { return e.input.shutdown; }},
+          [](const Evidence& e) { return e.input.requests.shutdown; }},
     Cause{{Reason::emergency_stop, Mode::fault, Clearance::disarm_then_arm},
-          [](const Evidence& e) { return e.input.emergency_stop; }},
+          [](const Evidence& e) { return e.input.requests.emergency_stop; }},
     Cause{{Reason::valves_silent, Mode::fault, Clearance::disarm_then_arm},
           [](const Evidence& e) { return e.valves_silent() && e.pressurised(); }},
     Cause{{Reason::pressure_mismatch, Mode::fault, Clearance::disarm_then_arm},
@@ -56,7 +56,7 @@ constexpr std::array kCauses{
     Cause{{Reason::curvature_mismatch, Mode::fault, Clearance::disarm_then_arm},
           [](const Evidence& e) { return e.input.curvature_mismatch; }},
     Cause{{Reason::disarmed, Mode::vent, Clearance::arm},
-          [](const Evidence& e) { return e.input.disarm; }},
+          [](const Evidence& e) { return e.input.requests.disarm; }},
     Cause{{Reason::deadman_released, Mode::vent, Clearance::arm},
           [](const Evidence& e) {
             return e.input.deadman_used && e.go_age_ns > e.thresholds.deadman_timeout_ns;
@@ -196,9 +196,10 @@ CauseRule SafetyMonitor::worst_cause(const SafetyInput& input) const noexcept {
 void SafetyMonitor::take_operator_requests(const SafetyInput& input, Mode demanded) noexcept {
   // Armed is granted for what the operator sees now, never stored up for when a cause has gone, nor
   // for what queued up in the kernel while we were stopped and comes in as if it were new.
-  if (input.arm && demanded < Mode::vent && mode_ != Mode::fault && input.now_ns >= deaf_until_ns_)
+  if (input.requests.arm && demanded < Mode::vent && mode_ != Mode::fault &&
+      input.now_ns >= deaf_until_ns_)
     armed_ = true;
-  if (input.disarm || input.shutdown) armed_ = false;
+  if (input.requests.disarm || input.requests.shutdown) armed_ = false;
 }
 
 void SafetyMonitor::enter(const CauseRule& cause) noexcept {
@@ -275,7 +276,7 @@ Mode SafetyMonitor::step(const SafetyInput& input) noexcept {
       // Disarming acknowledges a fault whose cause has gone; the arm stays vented until it is armed
       // again. An emergency stop is told even where a fault came before it.
       if (worst.reason == Reason::emergency_stop || worst.clearance == Clearance::never ||
-          (input.disarm && worst.demands < Mode::fault))
+          (input.requests.disarm && worst.demands < Mode::fault))
         enter(worst);
       break;
   }

@@ -115,9 +115,9 @@ void DaemonLink::take_operator(const ReceivedMessage& packet) noexcept {
   using Request = softarm_messages::operator_command_t;
   const bool arm = operator_message_.request == Request::ARM;
   const bool emergency = operator_message_.request == Request::EMERGENCY_STOP;
-  input_.emergency_stop |= emergency;
-  input_.disarm |= !arm && !emergency;
-  input_.arm |= arm && newer;
+  input_.requests.emergency_stop |= emergency;
+  input_.requests.disarm |= !arm && !emergency;
+  input_.requests.arm |= arm && newer;
 }
 
 void DaemonLink::take_measurement(const ReceivedMessage& packet) noexcept {

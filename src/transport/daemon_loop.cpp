@@ -53,7 +53,7 @@ void DaemonLoop::run(const std::function<bool()>& stop_requested,
 
 void DaemonLoop::tick(std::int64_t woken_ns, bool stopping) noexcept {
   TickInput input = link_.collect(woken_ns);
-  input.shutdown = stopping;
+  input.requests.shutdown = stopping;
   input.consecutive_overruns = judge_overruns_ ? missed_in_row_ : 0;
   const TickOutput& output = pipeline_.tick(input);
   const std::int64_t decided_ns = monotonic_now_ns();

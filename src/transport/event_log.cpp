@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <stdexcept>
 #include <utility>
 
 namespace softarm {
@@ -19,7 +20,18 @@ std::uint64_t number_at(const std::byte* bytes, std::size_t size) {
   return value;
 }
 
+void put_number(std::uint64_t value, std::size_t size, std::byte*& to) {
+  for (std::size_t k = size; k-- > 0;) *to++ = static_cast<std::byte>(value >> (8 * k) & 0xff);
+}
+
 }  // namespace
+
+EventLogReader::EventLogReader(const std::filesystem::path& path)
+    : file_(path, std::ios::binary), stream_(file_) {
+  if (!file_ || std::filesystem::is_directory(path))
+    throw std::runtime_error("cannot read " + path.string() +
+                             ": is it an LCM log (softarm import, lcm-logger)?");
+}
 
 /// Reads on until `wanted` bytes lie behind the cursor, or the log ends; returns how many do.
 std::size_t EventLogReader::available(std::size_t wanted) {
@@ -117,6 +129,45 @@ bool EventLogReader::next(LogEvent& event) {
   event.data = {header + kHeader + channel, size - kHeader - channel};
   event_ = size;
   return true;
+}
+
+EventLogWriter::EventLogWriter(const std::filesystem::path& file)
+    : path_(file), file_(file, std::ios::binary | std::ios::trunc) {
+  if (!file_) throw std::runtime_error(path_.string() + ": expected a file that can be written");
+}
+
+void EventLogWriter::write(std::int64_t time_us, std::string_view channel,
+                           std::span<const std::byte> data) {
+  if (channel.empty() || channel.size() > EventLogReader::kLargestChannel ||
+      data.size() > EventLogReader::kLargestData)
+    throw std::invalid_argument(
+        "an event of a log: expected a channel of 1 to " +
+        std::to_string(EventLogReader::kLargestChannel) + " bytes and data of up to " +
+        std::to_string(EventLogReader::kLargestData) + ", got " + std::to_string(channel.size()) +
+        " and " + std::to_string(data.size()));
+  std::array<std::byte, kHeader> header;
+  std::byte* to = std::copy(kSync.begin(), kSync.end(), header.data());
+  put_number(static_cast<std::uint64_t>(number_++), 8, to);
+  put_number(static_cast<std::uint64_t>(time_us), 8, to);
+  put_number(channel.size(), 4, to);
+  put_number(data.size(), 4, to);
+  const auto put = [this](const void* bytes, std::size_t size) {
+    file_.write(static_cast<const char*>(bytes), static_cast<std::streamsize>(size));
+  };
+  put(header.data(), header.size());
+  put(channel.data(), channel.size());
+  put(data.data(), data.size());
+  check();
+}
+
+void EventLogWriter::close() {
+  file_.close();
+  check();
+}
+
+void EventLogWriter::check() {
+  if (!file_)
+    throw std::runtime_error(path_.string() + ": could not be written; is the disk full?");
 }
 
 }  // namespace softarm

@@ -53,7 +53,8 @@ void LcmNode::dispatch(const lcm_recv_buf_t* packet, const char* /*channel*/, vo
   if (packet->data == nullptr || packet->data_size > LcmNode::kLargestMessage) return;
   const auto& subscription = *static_cast<const Subscription*>(user);
   subscription.handler({.bytes = {static_cast<const std::byte*>(packet->data), packet->data_size},
-                        .arrival_ns = subscription.arrivals->arrival_ns(packet->recv_utime)});
+                        .arrival_ns = subscription.arrivals->arrival_ns(packet->recv_utime),
+                        .stamp_us = packet->recv_utime});
 }
 
 void LcmNode::subscribe(const std::string& channel, int capacity, Handler handler) {

@@ -103,8 +103,9 @@ bool is_intact(std::span<const std::byte> encoded) noexcept {
 void to_record(const TickInput& input, tick_record_t& record) {
   // A new field of TickInput stops the build here: it belongs into lcmtypes/tick_record_t.lcm, into
   // this function, into RecordedInput::from and into the size that decode() checks.
-  const auto& [now_ns, frames, reference, arm, disarm, emergency_stop, shutdown, command_expired,
-               consecutive_overruns, newest_measurement_ns, measured_bar, newest_go_ns] = input;
+  const auto& [now_ns, frames, reference, requests, command_expired, consecutive_overruns,
+               newest_measurement_ns, measured_bar, newest_go_ns] = input;
+  const auto& [arm, disarm, emergency_stop, shutdown] = requests;
   record.now_ns = now_ns;
   record.num_frames = static_cast<std::int16_t>(frames.size());
   if (record.frames.size() < frames.size()) record.frames.resize(frames.size());
@@ -148,10 +149,10 @@ const TickInput& RecordedInput::from(const tick_record_t& record) {
                   vector_of(record.acceleration_radps2, record.dimension)};
     input_.reference = &reference_;
   }
-  input_.arm = record.arm != 0;
-  input_.disarm = record.disarm != 0;
-  input_.emergency_stop = record.emergency_stop != 0;
-  input_.shutdown = record.shutdown != 0;
+  input_.requests = {.arm = record.arm != 0,
+                     .disarm = record.disarm != 0,
+                     .emergency_stop = record.emergency_stop != 0,
+                     .shutdown = record.shutdown != 0};
   input_.command_expired = record.command_expired != 0;
   input_.consecutive_overruns = record.consecutive_overruns;
   input_.newest_measurement_ns = record.newest_measurement_ns;

@@ -111,7 +111,7 @@ bool ModbusServer::wait_until(std::int64_t deadline_ns) noexcept {
 void ModbusServer::accept_client() noexcept {
   const int socket = accept4(listener_, nullptr, nullptr, SOCK_CLOEXEC);
   if (socket < 0) return;
-  if (clients() == kMaxClients) {
+  if (static_cast<int>(clients_.size()) == kMaxClients) {
     ::close(socket);
     return;
   }

@@ -79,7 +79,7 @@ LinkResult SerialLine::send(std::string_view text) noexcept {
   const ssize_t sent = ::write(file_, line.data(), static_cast<std::size_t>(wanted));
   if (sent == wanted) return LinkResult::ok;
   if (sent < 0 && errno == EAGAIN) return ended(LinkResult::no_answer, ETIMEDOUT);
-  // Half a line would spoil the next one.
+  // Half a line would corrupt the next one.
   return ended(LinkResult::broken, sent < 0 ? errno : EIO);
 }
 

@@ -15,9 +15,8 @@ if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
   # The compiler collects garbage from 1 GB on instead of 128 MB: a fifth of the build's time.
   add_compile_options(--param=ggc-min-heapsize=1000000)
 endif()
-if(SOFTARM_NATIVE)
-  # g++ 12 takes its own AVX-512 intrinsics, undefined lanes and unused widths, for faults of ours.
-  add_compile_options(-march=native -Wno-error=maybe-uninitialized -Wno-error=array-bounds)
+if(SOFTARM_MARCH)
+  add_compile_options(-march=${SOFTARM_MARCH})
 endif()
 if(SOFTARM_SANITIZE)
   add_compile_options(-fsanitize=${SOFTARM_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all)

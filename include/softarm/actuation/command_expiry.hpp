@@ -26,6 +26,14 @@ struct PressureCommand {
       pressure_bar;  ///< above ambient; segment by segment, in each the configured chamber order
 };
 
+/// The sender's view of the same rule: what was valid for `validity_us` from `sent_us` on is no
+/// longer in force at `now_us`, so the valves have vented unless another command came. All on one
+/// clock.
+constexpr bool has_expired(std::int64_t sent_us, std::int64_t validity_us,
+                           std::int64_t now_us) noexcept {
+  return now_us - sent_us >= validity_us;
+}
+
 /// Decides which command is in force, so that the arm vents by itself when its controller falls
 /// silent: no clock of its own, time comes in as an argument.
 ///

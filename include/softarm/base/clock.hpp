@@ -22,6 +22,10 @@ struct ClockPair {
 /// Reads both together: of a few attempts the one that was held up least between the readings.
 ClockPair read_clocks() noexcept;
 
+/// CLOCK_REALTIME in ns since 1970: the only clock that two machines, and two boots of one, share.
+/// It may be set at any time, also back.
+std::int64_t wall_now_ns() noexcept;
+
 /// Sleeps until an absolute time of CLOCK_MONOTONIC; returns early when a signal arrives.
 void sleep_until_ns(std::int64_t deadline_ns) noexcept;
 

@@ -18,7 +18,7 @@ struct IdentificationSettings {
   std::vector<double> rest_u_rad;  ///< 2n: where the springs rest; empty: straight
   double cubic_nm_per_rad3 = 0.0;
   double lag_s = 0.0;
-  double delay_s = 0.0;
+  double dead_time_s = 0.0;
 };
 
 }  // namespace softarm

@@ -37,10 +37,13 @@ struct EvalCase {
 /// One term: a number, a vector, a matrix, or one matrix per segment; no matrices at all where the
 /// quantity does not exist.
 struct EvalTerm {
-  enum class Shape { number, vector, matrix, list } shape = Shape::matrix;
+  /// How `matrices` are to be read.
+  enum class Shape { number, vector, matrix, list };
+  Shape shape = Shape::matrix;
   std::vector<Eigen::MatrixXd> matrices;
 };
 
+/// A term with its name in the table of `evaluate`.
 struct NamedTerm {
   std::string name;
   EvalTerm term;

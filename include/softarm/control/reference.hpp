@@ -55,8 +55,8 @@ double largest_theta_rad(const ReferenceSettings& settings) noexcept;
 /// derivatives exact), and flagged; a blend that still exceeds max_speed_radps is only flagged.
 class Reference {
  public:
-  /// Throws std::invalid_argument (phase, expected, got) for sizes, times or limits that do not
-  /// fit.
+  /// Throws ReferenceError for sizes, times or limits of a phase that do not fit, and
+  /// std::invalid_argument for other settings.
   Reference(const ReferenceSettings& settings, const ControllerSettings& control,
             const ArmParameters& arm);
   /// Where no phase is in task space, the number of segments is all that matters.

@@ -5,7 +5,8 @@
 //     double rate_radps = 1.0;
 //     const char* name() const noexcept { return "spiral"; }
 //     void describe(Keys& key) { key("rate_radps", rate_radps, from(0, 10), "of phi"); }
-//     void check(const std::string& where, int segments) const;  // throws std::invalid_argument
+//     void check(const ReferencePlace& place, const ControllerSettings& control,
+//                int segments) const;  // place.require(rate_radps < 10, "less than 10", "more")
 //     double largest_theta_rad() const noexcept;
 //     double largest_speed_radps() const noexcept;
 //     void evaluate(double time_s, ReferenceSample& out) const noexcept;
@@ -13,6 +14,8 @@
 //   const ReferenceRegistration kSpiral(Spiral{});
 #pragma once
 
+#include <initializer_list>
+#include <stdexcept>
 #include <string>
 
 #include "softarm/base/kind.hpp"
@@ -39,13 +42,39 @@ struct ReferenceSample {
   TipReference tip;
 };
 
-/// What every kind has. `check` throws std::invalid_argument "WHERE: expected X, got Y" for
-/// settings that do not fit an arm of so many segments.
+/// What is wrong with a phase of a reference. what() is "reference[1].points[2].time_s: expected X,
+/// got Y", with the key that an experiment has there.
+class ReferenceError : public std::invalid_argument {
+ public:
+  /// @param place  within the phase, such as ".points[2].time_s"; empty: the phase as a whole
+  ReferenceError(int phase, const std::string& place, std::string expected_text,
+                 std::string got_text);
+
+  std::string key, expected, got;
+};
+
+/// A place within a phase, for what is wrong there.
+struct ReferencePlace {
+  int phase = 0;
+  std::string at = "";  ///< as ReferenceError has it
+
+  /// @throws ReferenceError unless it holds
+  void require(bool holds, const std::string& expected_text, const std::string& got_text) const {
+    if (!holds) throw ReferenceError(phase, at, expected_text, got_text);
+  }
+  void require_finite(std::initializer_list<double> values) const;
+};
+
+struct ControllerSettings;
+
+/// What every kind has. `check` throws ReferenceError for settings that do not fit the limits or an
+/// arm of so many segments.
 template <class K>
-concept AnyReference = requires(const K& kind, const std::string& where, int segments) {
+concept AnyReference = requires(const K& kind, const ReferencePlace& place,
+                                const ControllerSettings& control, int segments) {
   { kind.name() }
   noexcept->std::convertible_to<const char*>;
-  kind.check(where, segments);
+  kind.check(place, control, segments);
 };
 
 /// A motion of the curvatures, known beforehand. `evaluate` is called in the tick with the time (s)
@@ -79,7 +108,8 @@ class ReferenceInterface {
   virtual ~ReferenceInterface() = default;
   virtual const char* name() const noexcept = 0;
   virtual std::shared_ptr<const ReferenceInterface> described(Keys& key) const = 0;
-  virtual void check(const std::string& where, int segments) const = 0;
+  virtual void check(const ReferencePlace& place, const ControllerSettings& control,
+                     int segments) const = 0;
   virtual double largest_theta_rad() const noexcept = 0;
   virtual double largest_speed_radps() const noexcept = 0;
   virtual void evaluate(double time_s, ReferenceSample& out) const noexcept = 0;
@@ -96,7 +126,9 @@ class ReferenceKind : public NamedKind<ReferenceInterface> {
   requires CurvatureReference<K> || TipReferencePath<K> || std::same_as<K, LiveReference>
   ReferenceKind(K kind) : NamedKind(std::make_shared<Model<K>>(std::move(kind))) {}
 
-  void check(const std::string& where, int segments) const { model().check(where, segments); }
+  void check(const ReferencePlace& place, const ControllerSettings& control, int segments) const {
+    model().check(place, control, segments);
+  }
   /// What a path of the tip and a live reference reach is not known beforehand: 0.
   double largest_theta_rad() const noexcept { return model().largest_theta_rad(); }
   double largest_speed_radps() const noexcept { return model().largest_speed_radps(); }
@@ -117,8 +149,9 @@ class ReferenceKind : public NamedKind<ReferenceInterface> {
     std::shared_ptr<const ReferenceInterface> described(Keys& key) const override {
       return this->template described_as<Model>(key);
     }
-    void check(const std::string& where, int segments) const override {
-      value.check(where, segments);
+    void check(const ReferencePlace& place, const ControllerSettings& control,
+               int segments) const override {
+      value.check(place, control, segments);
     }
     double largest_theta_rad() const noexcept override {
       if constexpr (CurvatureReference<K>) return value.largest_theta_rad();

@@ -21,7 +21,7 @@ struct SetPointReference {
 
   const char* name() const noexcept { return "set_point"; }
   void describe(Keys& key);
-  void check(const std::string& where, int segments) const;
+  void check(const ReferencePlace& place, const ControllerSettings& control, int segments) const;
   double largest_theta_rad() const noexcept;
   double largest_speed_radps() const noexcept { return 0.0; }
   void evaluate(double time_s, ReferenceSample& out) const noexcept;
@@ -39,7 +39,7 @@ struct PaperReference {
 
   const char* name() const noexcept { return "paper"; }
   void describe(Keys& key);
-  void check(const std::string& where, int segments) const;
+  void check(const ReferencePlace& place, const ControllerSettings& control, int segments) const;
   double largest_theta_rad() const noexcept { return theta_rad; }
   double largest_speed_radps() const noexcept;
   void evaluate(double time_s, ReferenceSample& out) const noexcept;
@@ -57,7 +57,7 @@ struct WayPointReference {
 
   const char* name() const noexcept { return "way_points"; }
   void describe(Keys& key);
-  void check(const std::string& where, int segments) const;
+  void check(const ReferencePlace& place, const ControllerSettings& control, int segments) const;
   double largest_theta_rad() const noexcept;
   double largest_speed_radps() const noexcept;
   void evaluate(double time_s, ReferenceSample& out) const noexcept;
@@ -69,7 +69,7 @@ struct LiveReference {
 
   const char* name() const noexcept { return "live"; }
   void describe(Keys& key);
-  void check(const std::string& where, int segments) const;
+  void check(const ReferencePlace& place, const ControllerSettings& control, int segments) const;
 };
 
 /// Path p_d(t) of the tip in the world.
@@ -89,7 +89,7 @@ struct TipPathReference {
 
   const char* name() const noexcept;
   void describe(Keys& key);
-  void check(const std::string& where, int segments) const;
+  void check(const ReferencePlace& place, const ControllerSettings& control, int segments) const;
   TipReference tip(double time_s) const noexcept;
   /// How far the path goes from a point, at 720 instants of its period.
   double largest_distance_m(const Eigen::Vector3d& from_m) const noexcept;

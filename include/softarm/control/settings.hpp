@@ -44,7 +44,7 @@ struct ControllerSettings {
   /// the paper. Empty or zero: none, at no cost.
   std::vector<double> ki;
   double valve_lag_s = 0.0;
-  double delay_s = 0.0;
+  double dead_time_s = 0.0;
   double max_theta_rad = 2.5;
   double max_speed_radps = 20.0;
   double max_step_rad = 0.2;

@@ -4,7 +4,6 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <fstream>
 #include <vector>
 
 #include "softarm/base/histogram.hpp"
@@ -45,7 +44,6 @@ class LoggedRun {
   ControlPipeline pipeline_;
   SimulatedOperator operator_;
   MocapSource mocap_;
-  std::ifstream file_;
   EventLogReader log_;
   std::vector<MocapFrame> frames_;
   MocapFrame next_;  ///< read from the log, not arrived yet

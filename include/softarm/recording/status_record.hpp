@@ -6,8 +6,6 @@
 #include <deque>
 #include <filesystem>
 #include <optional>
-#include <softarm_messages/controller_status_t.hpp>
-#include <softarm_messages/plant_state_t.hpp>
 #include <softarm_messages/timing_t.hpp>
 #include <span>
 #include <string>
@@ -16,13 +14,14 @@
 #include "softarm/config/experiment.hpp"
 #include "softarm/recording/experiment_log.hpp"
 #include "softarm/recording/tracking_summary.hpp"
+#include "softarm/transport/arm_messages.hpp"
 
 namespace softarm {
 
 /// A simulated arm's state between two of its reports.
 class TruthTrack {
  public:
-  void add(const softarm_messages::plant_state_t& state);
+  void add(const PlantState& state);
   bool reaches(std::int64_t time_us) const { return after_ && after_->time_us >= time_us; }
 
   /// True u, real pressures and tip at time_us into the row; nothing where that is not between two
@@ -30,7 +29,7 @@ class TruthTrack {
   void fill(std::int64_t time_us, LogRow& row) const;
 
  private:
-  std::optional<softarm_messages::plant_state_t> before_, after_;
+  std::optional<PlantState> before_, after_;
 };
 
 /// Takes the daemon's status and timing, and what a simulated arm says of itself; every status
@@ -45,9 +44,6 @@ class StatusRecord {
   /// nothing is taken. Returns whether it was a status of this arm.
   bool take(std::string_view channel, std::span<const std::byte> bytes);
 
-  /// Writes the rows that are complete, or all of them.
-  void write_rows(bool all);
-
   /// Writes the last rows and the files. @throws std::runtime_error if anything could not be
   /// written
   void close();
@@ -56,7 +52,7 @@ class StatusRecord {
   std::string table() const;
 
   /// The newest status, and how long ago the first one was.
-  const softarm_messages::controller_status_t& status() const { return status_; }
+  const ArmStatus& status() const { return status_; }
   double time_s() const;
   std::int64_t rows() const { return rows_; }
   double active_s() const { return active_s_; }
@@ -67,6 +63,8 @@ class StatusRecord {
     LogRow row;
   };
   bool take_status(std::span<const std::byte> bytes);
+  /// The rows that are complete, or all of them.
+  void write_rows(bool all);
   std::string timing_text() const;
   std::string timing_table() const;
 
@@ -76,9 +74,8 @@ class StatusRecord {
   std::optional<ExperimentLog> log_;
   TruthTrack truth_;
   std::deque<WaitingRow> waiting_;
-  softarm_messages::controller_status_t status_{}, decoded_{};
+  ArmStatus status_;
   bool commander_heard_ = false;  ///< a daemon that is no shadow
-  softarm_messages::plant_state_t plant_message_{};
   softarm_messages::timing_t timing_{};
   bool timing_received_ = false;
   std::int64_t start_us_ = 0;

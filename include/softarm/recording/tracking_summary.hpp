@@ -6,15 +6,12 @@
 #include <limits>
 #include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "softarm/estimation/frame_validator.hpp"
 #include "softarm/runtime/log_row.hpp"
 
 namespace softarm {
-
-class JsonWriter;
 
 /// How well a reference was tracked, accumulated tick by tick: reference minus the plant's true u,
 /// from `tracking_from_s` after each ACTIVE on. Where the reference is a path of the tip, also when
@@ -62,13 +59,33 @@ class TrackingSummary {
       sum += error * error;
       ++count;
     }
+    void add(const MeanSquare& other) {
+      sum += other.sum;
+      count += other.count;
+    }
     double rms() const;  ///< NaN when empty
   };
+  /// Squared errors of the tip, so that those of the second half can be summed although nobody
+  /// knows yet when that begins. Row by row at first; where there are many, two neighbours become
+  /// one.
+  class TipErrors {
+   public:
+    void add(double t_s, double error_m);
+    MeanSquare since(double t_s) const;  ///< of the stretches that begin then, or later
+
+   private:
+    static constexpr std::size_t kMostStretches = 65'536;
+    struct Stretch {
+      double begin_s;
+      MeanSquare errors;
+    };
+    std::vector<Stretch> stretches_;
+    std::int64_t rows_a_stretch_ = 1;
+  };
+  struct Json;  ///< makes the parts of json()
   void add_tracking(const LogRow& row);
   void add_tip(const LogRow& row);
   std::string tip_line() const;
-  void write_tracking(JsonWriter& json) const;
-  void write_frames(JsonWriter& json) const;
 
   int segments_;
   double tracking_from_s_;
@@ -81,7 +98,7 @@ class TrackingSummary {
   MeanSquare u_;
   double u_max_rad_ = std::numeric_limits<double>::quiet_NaN();
   std::vector<MeanSquare> u_of_segment_, theta_, phi_;
-  std::vector<std::pair<double, double>> tip_squared_;  ///< time and squared error, for the halves
+  TipErrors tip_;
   double tip_max_m_ = std::numeric_limits<double>::quiet_NaN();
   bool tip_is_asked_ = false;    ///< the reference was a path of the tip
   double tip_last_far_s_ = 0.0;  ///< after the latest ACTIVE: when the tip was last kTipNear_m off

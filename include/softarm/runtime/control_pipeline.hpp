@@ -33,10 +33,7 @@ struct TickInput {
   std::int64_t now_ns = 0;
   std::span<const MocapFrame> frames;  ///< in order of arrival, capture times on our clock
   const LiveReferenceInput* reference = nullptr;  ///< the newest, if one came
-  bool arm = false;
-  bool disarm = false;
-  bool emergency_stop = false;
-  bool shutdown = false;         ///< from now on: vent, and nothing else
+  OperatorRequests requests = {};
   bool command_expired = false;  ///< so long ago was one sent that the valves have vented meanwhile
   int consecutive_overruns = 0;  ///< ticks missed in a row; zero where they are not to be judged
   /// Arrival of the newest pressure measurement, where the valves publish them.

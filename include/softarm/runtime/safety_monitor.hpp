@@ -79,6 +79,14 @@ struct SafetyThresholds {
 SafetyThresholds resolve_thresholds(const SafetySettings& settings,
                                     double control_period_s) noexcept;
 
+/// What people, or the program around, ask of the tick; more than one at once is possible.
+struct OperatorRequests {
+  bool arm = false;
+  bool disarm = false;
+  bool emergency_stop = false;
+  bool shutdown = false;  ///< from now on: vent, and nothing else
+};
+
 /// What the monitor is told in one tick. Times are of one monotonic clock, in ns.
 struct SafetyInput {
   std::int64_t now_ns = 0;
@@ -97,10 +105,7 @@ struct SafetyInput {
   bool command_expired = false;                 ///< the valves have vented for want of a command
   bool deadman_used = false;                    ///< there is a dead-man input
   std::int64_t newest_go_ns = kNever;           ///< of that
-  bool arm = false;
-  bool disarm = false;
-  bool emergency_stop = false;
-  bool shutdown = false;
+  OperatorRequests requests = {};
 };
 
 /// Reads no clock, allocates nothing, throws nothing. Transitions follow the severity of the causes

@@ -24,7 +24,7 @@ class DaemonLoop {
   DaemonLoop(const PipelineSettings& settings, const TransportSettings& transport,
              const Provenance& provenance, bool shadow);
 
-  /// Ticks until `stop_requested` says so and every pressure has been commanded to zero.
+  /// Ticks until `stop_requested` returns true and every pressure has been commanded to zero.
   /// Neither allocates nor throws, as long as the functions do not.
   void run(const std::function<bool()>& stop_requested,
            const std::function<void(const Report&)>& after_tick);

@@ -1,17 +1,21 @@
-// Reading LCM's event logs (lcm-logger, softarm import), damaged ones too.
+// LCM's event logs (lcm-logger): reading them, damaged ones too, and writing them.
 //
-//   std::ifstream file(path, std::ios::binary);
-//   EventLogReader log(file);
+//   EventLogReader log(path);
 //   for (LogEvent event; log.next(event);) use(event.channel, event.data);
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
+#include <fstream>
 #include <istream>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
 #include <vector>
+
+#include "softarm/base/time.hpp"
 
 namespace softarm {
 
@@ -19,9 +23,15 @@ namespace softarm {
 struct LogEvent {
   std::int64_t position = 0;  ///< of its first byte in the log
   std::int64_t number = 0;    ///< as the logger counted
-  std::int64_t time_us = 0;   ///< arrival at the logger, its wall clock
+  std::int64_t time_us = 0;   ///< arrival at the logger, its wall clock; any number if damaged
   std::string_view channel;
   std::span<const std::byte> data;
+
+  /// The same in ns; nothing where it is no time whose nanoseconds can be added and subtracted.
+  std::optional<std::int64_t> arrival_ns() const noexcept {
+    if (time_us < 0 || !is_time_us(time_us)) return std::nullopt;
+    return 1000 * time_us;
+  }
 };
 
 /// Bytes [begin, end) of a log that belong to no event.
@@ -40,6 +50,8 @@ class EventLogReader {
   static constexpr std::size_t kLargestData = 4 << 20;  ///< larger ones count as damage
   static constexpr std::size_t kDamagesKept = 16;
 
+  /// @throws std::runtime_error where the file cannot be read
+  explicit EventLogReader(const std::filesystem::path& path);
   /// The stream must outlive the reader.
   explicit EventLogReader(std::istream& stream) : stream_(stream) {}
 
@@ -63,6 +75,7 @@ class EventLogReader {
   void skip_to_sync();
   void add_damage(std::int64_t begin, std::int64_t end);
 
+  std::ifstream file_;
   std::istream& stream_;
   std::vector<std::byte> buffer_;
   std::size_t at_ = 0;         ///< of the buffer: what precedes it has been read
@@ -72,6 +85,28 @@ class EventLogReader {
   std::vector<LogDamage> damages_;
   std::int64_t damage_count_ = 0;
   std::int64_t damaged_bytes_ = 0;
+};
+
+/// Writes a log that lcm-logplayer and EventLogReader read. Events are numbered from 0.
+class EventLogWriter {
+ public:
+  /// What was there before is overwritten. @throws std::runtime_error if it cannot be opened
+  explicit EventLogWriter(const std::filesystem::path& file);
+
+  /// @param time_us  arrival, wall clock, as the logs of lcm-logger have it
+  /// @param channel  1 to EventLogReader::kLargestChannel bytes  @param data  up to kLargestData
+  /// @throws std::invalid_argument for others; std::runtime_error if the file could not be written
+  void write(std::int64_t time_us, std::string_view channel, std::span<const std::byte> data);
+
+  /// Everything is in the file after this, or it throws std::runtime_error. Writes nothing further.
+  void close();
+
+ private:
+  void check();
+
+  std::filesystem::path path_;
+  std::ofstream file_;
+  std::int64_t number_ = 0;
 };
 
 }  // namespace softarm

@@ -26,6 +26,7 @@ class TransportError : public std::runtime_error {
 struct ReceivedMessage {
   std::span<const std::byte> bytes;
   std::int64_t arrival_ns;  ///< at this machine, CLOCK_MONOTONIC; does not decrease (ArrivalClock)
+  std::int64_t stamp_us;    ///< the same as LCM stamped it: wall clock
 };
 
 /// Belongs to one thread. The C interface of LCM serves underneath, because the C++ one allocates

@@ -22,8 +22,8 @@ class ValvesLoop {
   /// `driver` must outlive this. @throws TransportError
   ValvesLoop(const LcmSettings& lcm, double rate_hz, ValveDriver& driver);
 
-  /// Cycles until `stop_requested` says so and zero is confirmed, or cannot be; true if it was.
-  /// Neither allocates nor throws, as long as the functions do not.
+  /// Cycles until `stop_requested` returns true and zero is confirmed, or cannot be; true if it
+  /// was. Neither allocates nor throws, as long as the functions do not.
   bool run(const std::function<bool()>& stop_requested,
            const std::function<void(const Report&)>& after_cycle);
 

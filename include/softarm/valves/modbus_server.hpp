@@ -24,7 +24,6 @@ class ModbusServer {
   ModbusServer& operator=(const ModbusServer&) = delete;
 
   int port() const noexcept { return port_; }
-  int clients() const noexcept { return static_cast<int>(clients_.size()); }
 
   /// Waits until a client wants something, or `deadline_ns` of CLOCK_MONOTONIC; says which. False
   /// also when a signal cut the wait short.

@@ -1,5 +1,5 @@
-// What an experiment says about the valves: who drives them, where the terminal is, its registers,
-// what counts as a fault.
+// What an experiment configures of the valves: what drives them, where the terminal is, its
+// registers, what counts as a fault.
 // config/template.yaml documents every setting.
 #pragma once
 
@@ -41,7 +41,7 @@ struct RegisterMap {
 
 /// Settings of softarm-valves.
 struct ValveDriverSettings {
-  std::string backend = "modbus";  ///< who drives the valves: a name of valve_backend_names()
+  std::string backend = "modbus";  ///< what drives the valves: a name of valve_backend_names()
   std::string device;              ///< what a back end that is not on a network opens
   std::string host = "127.0.0.1";
   int port = 502;

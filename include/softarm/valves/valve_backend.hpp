@@ -47,11 +47,12 @@ class ValveBackend {
  public:
   virtual ~ValveBackend() = default;
 
-  /// Opens the connection, anew if it is open. False: `error` has the reason.
+  /// Opens the connection, after closing one that is open. False: `error` has the reason.
   virtual bool connect() noexcept = 0;
   virtual void close() noexcept = 0;
   virtual bool is_open() const noexcept = 0;
 
+  /// What `secure` achieved.
   struct Secured {
     LinkResult result;
     bool confirmed;  ///< the time-out reads back as it was set
@@ -80,8 +81,8 @@ class ValveBackend {
 using ValveBackendFactory = std::function<std::unique_ptr<ValveBackend>(
     const ValveDriverSettings& settings, double max_pressure_bar)>;
 
-/// Adds a back end under a name, which `valves.backend` of an experiment may then say. Before the
-/// driver starts. @throws std::invalid_argument if the name is taken
+/// Adds a back end under a name that `valves.backend` of an experiment may have. To be called
+/// before the driver starts. @throws std::invalid_argument if the name is taken
 void add_valve_backend(const std::string& name, ValveBackendFactory make);
 
 /// The one line that a class of your own takes, beside it:

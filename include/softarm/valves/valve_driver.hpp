@@ -1,4 +1,4 @@
-// Commands to valves: the guard decides, a back end acts. Neither sockets of its own nor messages.
+// Commands to valves: the guard decides, a back end acts. No LCM here.
 #pragma once
 
 #include <Eigen/Core>

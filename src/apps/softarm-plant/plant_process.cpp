@@ -28,9 +28,9 @@ PlantProcess::PlantProcess(const Experiment& experiment, std::optional<int> modb
       node_(lcm_.url),
       // Registers hold until the terminal's own time-out, and for ever without one.
       arm_(experiment.plant, monotonic_now_ns(),
-           modbus_port ? kForever : std::llround(1e9 * experiment.safety.command_validity_s)),
+           modbus_port ? kForever : to_ns(experiment.safety.command_validity_s)),
       by_torque_(experiment.plant.actuation.kind == ActuationKind::torque),
-      report_period_ns_(static_cast<std::int64_t>(1e9 / experiment.plant.mocap.rate_hz)) {
+      report_period_ns_(to_ns(1.0 / experiment.plant.mocap.rate_hz)) {
   if (modbus_port) {
     modbus_ = std::make_unique<ModbusSide>(experiment.valves, *modbus_port);
     say(fmt::format("softarm-plant: valve terminal at 127.0.0.1 port {}\n",
@@ -80,11 +80,10 @@ void PlantProcess::serve_requests(std::int64_t deadline_ns) {
   if (!terminal.take_served()) return;
   const Eigen::VectorXd& bar = terminal.set_points_bar();
   const double timeout_s = terminal.timeout_s();
-  arm_.command(
-      {.sequence = modbus_->sequence++,
-       .validity_ns = timeout_s > 0.0 ? static_cast<std::int64_t>(1e9 * timeout_s) : kForever,
-       .pressure_bar = {bar.data(), static_cast<std::size_t>(bar.size())}},
-      arm_now_ns());
+  arm_.command({.sequence = modbus_->sequence++,
+                .validity_ns = timeout_s > 0.0 ? to_ns(timeout_s) : kForever,
+                .pressure_bar = {bar.data(), static_cast<std::size_t>(bar.size())}},
+               arm_now_ns());
 }
 
 /// The arm's own time: the monotonic clock without what was lost.
@@ -94,7 +93,7 @@ std::int64_t PlantProcess::arm_now_ns() {
   if (excess_ns <= 0) return now_ns;
   lost_ns_ += excess_ns;
   say(fmt::format("softarm-plant: {:.3f} s behind real time; the arm stood still meanwhile\n",
-                  1e-9 * static_cast<double>(excess_ns)));
+                  to_seconds(excess_ns)));
   return now_ns - excess_ns;
 }
 

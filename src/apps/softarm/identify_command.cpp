@@ -38,10 +38,12 @@ MotionRecord play(const Experiment& experiment, const IdentifyCommand& command) 
   return outcome.record;
 }
 
-MotionRecord record_of(const Experiment& experiment, const IdentifyCommand& command) {
+MotionRecord record_of(const Experiment& experiment, IdentifyCommand& command) {
   if (command.live) return play(experiment, command);
   if (command.log.empty()) return record_step_response(experiment, command.plan);
-  MotionRecord record = read_log(experiment, command.log, command.input);
+  const LoggedMotion logged = read_log(experiment, command.log, command.input);
+  command.damage = logged.damage;
+  MotionRecord record = logged.record;
   const double end_s = record.time_s[record.time_s.size() - 1] + 1e-6;
   const double to_s = command.to_s > 0.0 ? std::min(command.to_s, end_s) : end_s;
   record = record.part(command.from_s, to_s, 0.0);
@@ -155,7 +157,12 @@ void add_identify_command(CLI::App& app) {
     options->has_hold = command->count("--hold") > 0;
     options->coverage = command->count("--seeds") > 0;
     options->study.window_s = options->options.window_s;
-    if (const int code = identify(*options); code != kExitOk) throw CLI::RuntimeError(code);
+    int code = identify(*options);
+    if (!options->damage.empty()) {
+      print_error("softarm", options->log + ": " + options->damage);
+      if (code == kExitOk) code = kExitData;
+    }
+    if (code != kExitOk) throw CLI::RuntimeError(code);
   });
 }
 

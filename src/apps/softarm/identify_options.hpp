@@ -14,6 +14,7 @@ namespace softarm {
 
 struct IdentifyCommand {
   std::string config, output, log, out;
+  std::string damage;  ///< of the log, found while it is read
   LoggedInput input = LoggedInput::commanded;
   FitChoice choice;
   StepPlan plan;

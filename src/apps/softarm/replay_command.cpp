@@ -2,14 +2,13 @@
 #include <fmt/format.h>
 
 #include <filesystem>
-#include <fstream>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <string>
 
 #include "apps/program.hpp"
 #include "apps/progress.hpp"
 #include "apps/softarm/commands.hpp"
-#include "softarm/base/json_writer.hpp"
 #include "softarm/base/version.hpp"
 #include "softarm/config/load.hpp"
 #include "softarm/recording/replay.hpp"
@@ -29,57 +28,46 @@ int exit_code(const ReplaySummary& summary, const EventLogReader& log) {
   return is_identical(summary, log) ? kExitOk : kExitData;
 }
 
-void write_count(JsonWriter& json, const char* name, const ReplayCount& count) {
-  json.key(name);
-  json.open_object();
-  json.member("compared", count.compared);
-  json.member("different", count.different);
-  json.close_object();
+using Json = nlohmann::ordered_json;
+
+Json json_of(const ReplayCount& count) {
+  return {{"compared", count.compared}, {"different", count.different}};
 }
 
-void write_difference(JsonWriter& json, const ReplaySummary& summary) {
-  json.key("first_difference");
-  if (!summary.different()) return json.null();
-  json.open_object();
-  json.member("run", summary.first.run);
-  json.member("tick", summary.first.tick);
-  json.member("time_s", summary.first.time_s);
-  json.member("position", summary.first.position);
-  json.key("fields");
-  json.open_array();
-  for (const FieldDifference& each : summary.first.fields) {
-    json.open_object();
-    json.member("field", each.field);
-    json.member("unit", each.unit);
-    json.member("recorded", each.recorded);
-    json.member("replayed", each.replayed);
-    json.close_object();
-  }
-  json.close_array();
-  json.close_object();
+Json json_of(const ReplayDifference& first) {
+  Json fields = Json::array();
+  for (const FieldDifference& each : first.fields)
+    fields.push_back({{"field", each.field},
+                      {"unit", each.unit},
+                      {"recorded", each.recorded},
+                      {"replayed", each.replayed}});
+  return {{"run", first.run},
+          {"tick", first.tick},
+          {"time_s", first.time_s},
+          {"position", first.position},
+          {"fields", std::move(fields)}};
 }
 
 std::string json_report(const ReplaySummary& summary, const EventLogReader& log) {
-  JsonWriter json;
-  json.open_object();
-  json.member("identical", is_identical(summary, log));
-  json.member("runs", summary.runs);
-  json.member("ticks", summary.ticks);
-  json.member("duration_s", summary.duration_s);
-  write_count(json, "commands_decided", summary.records);
-  write_count(json, "commands_sent", summary.commands);
-  write_count(json, "statuses", summary.statuses);
-  write_count(json, "after_gap", summary.after_gap);
-  json.member("missing_ticks", summary.missing_ticks);
-  json.member("gaps", summary.gap_count);
-  json.member("damages", log.damage_count());
-  json.member("damaged_bytes", log.damaged_bytes());
-  json.member("malformed", summary.malformed);
-  json.member("recorded_build", summary.recorded_build);
-  json.member("same_build", !summary.other_build);
-  write_difference(json, summary);
-  json.close_object();
-  return json.text();
+  const Json json{
+      {"identical", is_identical(summary, log)},
+      {"runs", summary.runs},
+      {"ticks", summary.ticks},
+      {"duration_s", summary.duration_s},
+      {"commands_decided", json_of(summary.records)},
+      {"commands_sent", json_of(summary.commands)},
+      {"statuses", json_of(summary.statuses)},
+      {"after_gap", json_of(summary.after_gap)},
+      {"missing_ticks", summary.missing_ticks},
+      {"gaps", summary.gap_count},
+      {"damages", log.damage_count()},
+      {"damaged_bytes", log.damaged_bytes()},
+      {"malformed", summary.malformed},
+      {"recorded_build", summary.recorded_build},
+      {"same_build", !summary.other_build},
+      {"first_difference", summary.different() ? json_of(summary.first) : Json(nullptr)}};
+  // What was recorded may be any bytes.
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
 int replay(const ReplayOptions& options) {
@@ -90,14 +78,8 @@ int replay(const ReplayOptions& options) {
                                        options.config));
     return kExitConfiguration;
   }
-  std::ifstream file(options.log, std::ios::binary);
-  std::error_code error;
-  const auto size = static_cast<double>(std::filesystem::file_size(options.log, error));
-  if (!file || error) {
-    print_error("softarm", fmt::format("{} cannot be read", options.log));
-    return kExitFailure;
-  }
-  EventLogReader log(file);
+  EventLogReader log(std::filesystem::path(options.log));
+  const auto size = static_cast<double>(std::filesystem::file_size(options.log));
   Replay replay(experiment, build_text(), options.any_configuration);
   try {
     Progress progress(true);

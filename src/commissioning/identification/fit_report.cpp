@@ -135,7 +135,7 @@ std::string identified_yaml(const Experiment& experiment, const ArmHypothesis& a
   text += fmt::format(
       "\nidentification:\n  lag_s: {:.6g}\n  delay_s: {:.6g}\n  cubic_nm_per_rad3: {:.6g}\n"
       "  rest_u_rad: [",
-      arm.lag_s, arm.delay_s, arm.cubic_nm_per_rad3);
+      arm.lag_s, arm.dead_time_s, arm.cubic_nm_per_rad3);
   for (Eigen::Index i = 0; i < arm.arm.size(); ++i)
     text += fmt::format("{}[{:.6g}, {:.6g}]", i > 0 ? ", " : "", arm.rest_rad[2 * i],
                         arm.rest_rad[2 * i + 1]);

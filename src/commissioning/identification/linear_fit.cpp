@@ -7,6 +7,9 @@
 #include <cmath>
 #include <numbers>
 #include <stdexcept>
+#include <utility>
+
+#include "commissioning/median.hpp"
 
 namespace softarm {
 namespace {
@@ -62,12 +65,10 @@ double typical_period_s(const MotionRecord& record) {
   std::vector<double> gaps;
   for (Eigen::Index k = 1; k < record.time_s.size(); ++k)
     gaps.push_back(record.time_s[k] - record.time_s[k - 1]);
-  std::nth_element(gaps.begin(), gaps.begin() + static_cast<std::ptrdiff_t>(gaps.size() / 2),
-                   gaps.end());
-  return gaps[gaps.size() / 2];
+  return median(std::move(gaps));
 }
 
-SmoothMotion smooth(const MotionRecord& record, double window_s, double lag_s, double delay_s) {
+SmoothMotion smooth(const MotionRecord& record, double window_s, double lag_s, double dead_time_s) {
   if (record.time_s.size() < 8)
     throw std::runtime_error(fmt::format("a record of {} frames is too short: expected at least 8",
                                          record.time_s.size()));
@@ -76,7 +77,7 @@ SmoothMotion smooth(const MotionRecord& record, double window_s, double lag_s, d
   const auto count = static_cast<Eigen::Index>(std::floor(span_s / period_s + 0.5)) + 1;
   const Eigen::MatrixXd u = evenly(record, period_s, count);
   Eigen::MatrixXd input(count, record.input.value.cols());
-  LaggedInput lagged(record.input, lag_s, delay_s);
+  LaggedInput lagged(record.input, lag_s, dead_time_s);
   Eigen::VectorXd p(input.cols());
   for (Eigen::Index k = 0; k < count; ++k) {
     lagged.at(record.time_s[0] + static_cast<double>(k) * period_s, p);
@@ -120,7 +121,7 @@ Eigen::VectorXd leftover(const ArmHypothesis& arm, const SmoothMotion& motion) {
 LinearFit fit_linear(const ParameterSet& set, const MotionRecord& record,
                      const Eigen::VectorXd& start, double window_s) {
   ArmHypothesis arm = set.arm(start);
-  const SmoothMotion motion = smooth(record, window_s, arm.lag_s, arm.delay_s);
+  const SmoothMotion motion = smooth(record, window_s, arm.lag_s, arm.dead_time_s);
   const Eigen::VectorXd before = leftover(arm, motion);
   if (before.size() < 4 * set.size())
     throw std::runtime_error(

@@ -141,8 +141,8 @@ void ParameterSet::add_times(const FitChoice& choice) {
     number("lag", "s", std::max(start_.lag_s, choice.inertia ? kLagScale_s : kSlow_s),
            &ArmHypothesis::lag_s, 0.0);
   if (choice.delay)
-    number("delay", "s", std::max(start_.delay_s, choice.inertia ? kDelayScale_s : kSlow_s),
-           &ArmHypothesis::delay_s, kUnbounded);
+    number("delay", "s", std::max(start_.dead_time_s, choice.inertia ? kDelayScale_s : kSlow_s),
+           &ArmHypothesis::dead_time_s, kUnbounded);
   // Recorded inputs are jagged: what a delay does is told over more than one of their steps.
   if (choice.delay && !choice.inertia)
     parameters_.back().difference = kJagged_s / parameters_.back().scale;

@@ -130,14 +130,14 @@ ArmHypothesis believed(const Experiment& experiment) {
     out.rest_rad[static_cast<Eigen::Index>(c)] = extra.rest_u_rad[c];
   out.cubic_nm_per_rad3 = extra.cubic_nm_per_rad3;
   out.lag_s = extra.lag_s;
-  out.delay_s = extra.delay_s;
+  out.dead_time_s = extra.dead_time_s;
   return out;
 }
 
 ArmHypothesis of_plant(const Experiment& experiment) {
   ArmHypothesis out = hypothesis(experiment.plant.arm, experiment.plant.actuation);
   out.lag_s = experiment.plant.valves.lag_s;
-  out.delay_s = experiment.plant.valves.dead_time_s;
+  out.dead_time_s = experiment.plant.valves.dead_time_s;
   return out;
 }
 
@@ -213,7 +213,7 @@ bool ResponseModel::simulate(const ArmHypothesis& arm, double longest_step_s,
                              Eigen::MatrixXd& u) const {
   const Eigen::Index frames = record_.time_s.size(), dof = arm.arm.dof();
   u.resize(frames, dof);
-  LaggedInput input(record_.input, arm.lag_s, arm.delay_s);
+  LaggedInput input(record_.input, arm.lag_s, arm.dead_time_s);
   Motion motion(arm);
   motion.reserve(dof);
   Eigen::VectorXd p0(arm.push.cols()), p1 = p0, p2 = p0, v = Eigen::VectorXd::Zero(dof);

@@ -5,6 +5,7 @@
 #include <limits>
 #include <optional>
 
+#include "commissioning/median.hpp"
 #include "softarm/base/time.hpp"
 #include "softarm/commissioning/preflight/checks.hpp"
 #include "softarm/runtime/safety_monitor.hpp"
@@ -98,12 +99,6 @@ Times times_of(const Observation& seen) {
                     : out.arrival_s.back());
   }
   return out;
-}
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 Finding check_rate(const Experiment& experiment, const Times& times) {

@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "commissioning/preflight/valve_map.hpp"
-#include "softarm/client/commander.hpp"
 #include "softarm/commissioning/preflight/checks.hpp"
 #include "softarm/transport/settings.hpp"
 

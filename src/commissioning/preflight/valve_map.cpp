@@ -7,7 +7,6 @@
 #include <numbers>
 
 #include "commissioning/preflight/geometry.hpp"
-#include "softarm/client/commander.hpp"
 #include "softarm/model/statics.hpp"
 
 namespace softarm {

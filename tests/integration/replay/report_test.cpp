@@ -6,8 +6,8 @@
 #include <fstream>
 #include <sstream>
 
-#include "integration/replay/recorded_log.hpp"
 #include "program_output.hpp"
+#include "unit/recording/recorded_log.hpp"
 
 namespace softarm {
 namespace {

@@ -1,5 +1,5 @@
 // A pressure board at the other end of a pseudo-terminal: its valves follow at once, and it does
-// what a test says.
+// what a test asks for.
 #pragma once
 
 #include <poll.h>

@@ -77,7 +77,7 @@ class ValvesProgram : public ::testing::Test {
 
   /// Handles messages, and commands `bar` in every chamber (unless negative), until `reached`.
   bool wait_for(const std::function<bool()>& reached, double bar = -1.0, double patience_s = 20.0) {
-    const std::int64_t end_ns = monotonic_now_ns() + static_cast<std::int64_t>(patience_s * 1e9);
+    const std::int64_t end_ns = monotonic_now_ns() + to_ns(patience_s);
     while (monotonic_now_ns() < end_ns) {
       if (reached()) return true;
       if (bar >= 0.0) send(bar);

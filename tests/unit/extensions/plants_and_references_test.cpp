@@ -59,9 +59,8 @@ struct Swing {
   double rate_radps = 1.5;
 
   const char* name() const noexcept { return "swing"; }
-  void check(const std::string& where, int) const {
-    if (!std::isfinite(rate_radps))
-      throw std::invalid_argument(where + ": expected a finite rate, got another");
+  void check(const ReferencePlace& place, const ControllerSettings&, int) const {
+    place.require_finite({amplitude_rad, rate_radps});
   }
   double largest_theta_rad() const noexcept { return 2.0 * amplitude_rad; }
   double largest_speed_radps() const noexcept { return amplitude_rad * rate_radps; }
@@ -82,7 +81,7 @@ struct Rock {
   double sway_m = 0.02;
 
   const char* name() const noexcept { return "rock"; }
-  void check(const std::string&, int) const {}
+  void check(const ReferencePlace&, const ControllerSettings&, int) const {}
   TipReference tip(double time_s) const noexcept {
     return {.position_m = {0.05, sway_m * std::sin(time_s), height_m},
             .velocity_mps = {0.0, sway_m * std::cos(time_s), 0.0},

@@ -35,7 +35,7 @@ struct Curl {
     key("rate_radps", rate_radps, from(0, 10), "of theta", Presence::required);
     key("until_s", until_s, above(0, 100), "then it rests");
   }
-  void check(const std::string&, int) const {}
+  void check(const ReferencePlace&, const ControllerSettings&, int) const {}
   double largest_theta_rad() const noexcept { return rate_radps * until_s; }
   double largest_speed_radps() const noexcept { return rate_radps; }
   void evaluate(double time_s, ReferenceSample& out) const noexcept {

@@ -34,9 +34,9 @@ TEST(PipelineAllocation, TenThousandTicksThroughAllModes) {
       // Every 2000 ticks: a silence of 20 frames, long enough for HOLD and VENT.
       bench->publishing = k % 2000 < 1900;
       if (k % 7 == 0) bench->input.reference = &live;
-      bench->input.disarm = k == 6000;
-      bench->input.arm = k == 6100;
-      bench->input.shutdown = k >= 9900;
+      bench->input.requests.disarm = k == 6000;
+      bench->input.requests.arm = k == 6100;
+      bench->input.requests.shutdown = k >= 9900;
       ++ticks_in[static_cast<std::size_t>(bench->tick().mode)];
     }
     EXPECT_EQ(test::thread_allocations - allocated, 0);

@@ -222,7 +222,7 @@ TEST_F(Pipeline, AfterAStallThatOutlivedACommandTheArmIsVentedAndDisarmed) {
   explicitly.safety.vent_after_s = 0.5;
   PipelineBench bench(explicitly);
   bench.run(200);
-  bench.input.arm = true;
+  bench.input.requests.arm = true;
   ASSERT_GT(bench.run_to(Mode::active), 0);
   bench.now_ns += 140 * kMs;
   bench.next_capture_ns = bench.now_ns;

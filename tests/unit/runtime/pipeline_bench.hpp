@@ -43,7 +43,7 @@ class PipelineBench {
     if (valves_publish) publish_pressures();
     if (going) input.newest_go_ns = now_ns;
     const TickOutput& output = pipeline.tick(input);
-    input.arm = input.disarm = input.emergency_stop = false;
+    input.requests.arm = input.requests.disarm = input.requests.emergency_stop = false;
     input.reference = nullptr;
     input.measured_bar = nullptr;
     return output;

@@ -102,7 +102,8 @@ TEST(PipelineInvariants, HoldInEveryTickOfRandomSequences) {
     const auto tick = [&] {
       faults.before_tick();
       faults.others_before_tick();
-      const bool disarm = bench.input.disarm, emergency_stop = bench.input.emergency_stop;
+      const bool disarm = bench.input.requests.disarm,
+                 emergency_stop = bench.input.requests.emergency_stop;
       const TickOutput& output = bench.tick();
       modes.insert(output.mode);
       reasons.insert(output.reason);
@@ -110,7 +111,7 @@ TEST(PipelineInvariants, HoldInEveryTickOfRandomSequences) {
     };
     for (unsigned k = 0; k < 3000 + 71 * seed; ++k)
       ASSERT_EQ(tick(), "") << "seed " << seed << ", tick " << k;
-    bench.input.shutdown = true;
+    bench.input.requests.shutdown = true;
     for (int k = 0; k < vent_ticks + 2; ++k)
       ASSERT_EQ(tick(), "") << "seed " << seed << ", shutting down, tick " << k;
     for (int k = 0; k < 100; ++k) {
@@ -252,7 +253,7 @@ TEST_F(Watches, SoftLimitsOnAngleAndSpeedVentAndWaitForAnArm) {
     bench.moves = true;
     bench.run(1500);
     EXPECT_EQ(bench.pipeline.output().reason, Reason::waiting_for_arm);
-    bench.input.arm = true;
+    bench.input.requests.arm = true;
     EXPECT_EQ(bench.tick().mode, Mode::active);
   }
 }

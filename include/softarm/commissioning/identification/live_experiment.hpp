@@ -10,6 +10,7 @@
 
 namespace softarm {
 
+/// What came of the steps on a running arm.
 struct LiveOutcome {
   MotionRecord record;
   std::string aborted;  ///< why, for a person; empty where all steps were played
@@ -18,7 +19,8 @@ struct LiveOutcome {
 /// Plays the steps on the command channel of the experiment, 100 commands a second within the
 /// configured slew, and records the frames of its mocap channel. The arm is vented, and the
 /// experiment over, where
-///  - `stop` says so (Ctrl-C), or a daemon says that it is armed,
+///  - `stop` says so (Ctrl-C), a daemon reports that it is armed, or somebody else commands the
+///  arm,
 ///  - a segment bends beyond identification.max_theta_rad or moves faster than max_speed_radps
 ///    (over the last 50 ms),
 ///  - no frame shows every segment for 0.2 s.

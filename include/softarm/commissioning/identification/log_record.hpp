@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
 
 #include "softarm/commissioning/identification/motion_record.hpp"
 #include "softarm/config/experiment.hpp"
@@ -14,10 +15,16 @@ enum class LoggedInput {
   measured    ///< what sensors read, on straight lines between readings
 };
 
+struct LoggedMotion {
+  MotionRecord record;
+  std::string damage;  ///< what of the log was not used, for people; empty: it is whole
+};
+
 /// Frames and pressures of the experiment's channels; times in s since the first frame. Frames that
-/// are repeated, or do not show every segment, are left out.
+/// are repeated, or do not show every segment, are left out. What precedes and follows damage is
+/// used.
 /// @throws std::runtime_error where the log cannot be read or holds too little of either
-MotionRecord read_log(const Experiment& experiment, const std::filesystem::path& log,
+LoggedMotion read_log(const Experiment& experiment, const std::filesystem::path& log,
                       LoggedInput input);
 
 }  // namespace softarm

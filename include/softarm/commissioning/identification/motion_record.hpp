@@ -28,7 +28,7 @@ struct MotionRecord {
 class LaggedInput {
  public:
   /// Starts settled at the first value.
-  LaggedInput(const InputTrack& track, double lag_s, double delay_s);
+  LaggedInput(const InputTrack& track, double lag_s, double dead_time_s);
 
   /// The value at `t_s`, which must not decrease from call to call. Where it jumps (without a
   /// lag): after the jump, or before it.
@@ -38,7 +38,7 @@ class LaggedInput {
   void advance(double t_s);
 
   const InputTrack& track_;
-  double lag_s_, delay_s_;
+  double lag_s_, dead_time_s_;
   double now_s_;
   Eigen::Index index_ = 0;  ///< the last sample that has been reached
   Eigen::VectorXd state_;

@@ -19,9 +19,9 @@ struct ArmHypothesis {
   std::vector<int> segment_of;  ///< of every input
   Eigen::VectorXd rest_rad;     ///< 2n: where the springs rest
   double cubic_nm_per_rad3 = 0.0;
-  bool inertia = true;   ///< false: damping alone resists motion, u' = D^-1 (push - springs - G)
-  double lag_s = 0.0;    ///< first order, from the input to what pushes
-  double delay_s = 0.0;  ///< before that
+  bool inertia = true;  ///< false: damping alone resists motion, u' = D^-1 (push - springs - G)
+  double lag_s = 0.0;   ///< first order, from the input to what pushes
+  double dead_time_s = 0.0;  ///< before that
 };
 
 /// What the controller of an experiment believes, with the terms of `identification`.

@@ -4,8 +4,8 @@
 
 #include <vector>
 
-#include "softarm/client/observation.hpp"
 #include "softarm/commissioning/preflight/findings.hpp"
+#include "softarm/commissioning/preflight/observation.hpp"
 #include "softarm/config/experiment.hpp"
 
 namespace softarm {

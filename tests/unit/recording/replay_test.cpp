@@ -1,4 +1,6 @@
 // Logs of runs in lock step, whole, lossy, damaged and forged, against softarm replay's core.
+#include "softarm/recording/replay.hpp"
+
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -8,9 +10,8 @@
 #include <memory>
 #include <sstream>
 
-#include "integration/replay/recorded_log.hpp"
-#include "softarm/recording/replay.hpp"
 #include "softarm/transport/message_decoding.hpp"
+#include "unit/recording/recorded_log.hpp"
 
 namespace softarm {
 namespace {

@@ -19,20 +19,22 @@ namespace softarm::test {
 /// Events in LCM's format, by our own hand: number, time, lengths, channel, data.
 class LogBytes {
  public:
-  void add(const std::string& channel, std::span<const std::byte> data) {
+  /// @param time_us  below zero: 0.1 ms after the one before
+  void add(const std::string& channel, std::span<const std::byte> data, std::int64_t time_us = -1) {
     put(0xEDA1DA01, 4);
     put(static_cast<std::uint64_t>(number_), 8);
-    put(static_cast<std::uint64_t>(1'000'000 + 100 * number_++), 8);
+    put(static_cast<std::uint64_t>(time_us < 0 ? 1'000'000 + 100 * number_ : time_us), 8);
+    ++number_;
     put(channel.size(), 4);
     put(data.size(), 4);
     bytes += channel;
     bytes.append(reinterpret_cast<const char*>(data.data()), data.size());
   }
   template <class Message>
-  void add_message(const std::string& channel, const Message& message) {
+  void add_message(const std::string& channel, const Message& message, std::int64_t time_us = -1) {
     std::vector<std::byte> data(static_cast<std::size_t>(message.getEncodedSize()));
     message.encode(data.data(), 0, static_cast<int>(data.size()));
-    add(channel, data);
+    add(channel, data, time_us);
   }
 
   std::string bytes;
@@ -98,9 +100,9 @@ inline RecordedRun record_run(const Experiment& experiment, double seconds, bool
     input.now_ns = now_ns;
     input.frames = frames;
     if (k % 50 == 0) input.reference = &reference;
-    input.disarm = k == ticks * 8 / 10;
-    input.arm = k % 40 == 0;
-    input.shutdown = part > 0.95;
+    input.requests.disarm = k == ticks * 8 / 10;
+    input.requests.arm = k % 40 == 0;
+    input.requests.shutdown = part > 0.95;
     input.command_expired = k == ticks * 6 / 10;
     input.consecutive_overruns = k % 17 == 0 ? 1 : 0;
     const TickOutput& output = pipeline.tick(input);

@@ -4,9 +4,12 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <lcm/lcm-cpp.hpp>
 #include <string>
 
+#include "softarm/base/time.hpp"
 #include "softarm/config/load.hpp"
 #include "softarm/simulation/simulated_arm.hpp"
 #include "softarm/transport/mocap_adapter.hpp"
@@ -39,6 +42,12 @@ class RecordedAtRest : public ::testing::Test {
     }
   }
   void TearDown() override { std::filesystem::remove(path_); }
+
+  std::string log() const {
+    std::ifstream file(path_, std::ios::binary);
+    return {std::istreambuf_iterator<char>(file), {}};
+  }
+  void write(const std::string& bytes) const { std::ofstream(path_, std::ios::binary) << bytes; }
 
   /// Seconds of ACTIVE; the last row is in `row_`.
   double active_s() {
@@ -73,6 +82,72 @@ TEST_F(RecordedAtRest, BecomesActiveWhereValvesPublishPressures) {
 TEST_F(RecordedAtRest, BecomesActiveWhereThereIsADeadManInput) {
   experiment_.safety.deadman = true;
   EXPECT_GT(active_s(), 1.5) << name(row_.mode) << ", " << name(row_.reason);
+}
+
+TEST_F(RecordedAtRest, HasARowEveryPeriodFromTheFirstFrameOn) {
+  LoggedRun run(experiment_, path_);
+  const double period_s = to_seconds(run.pipeline().period_ns());
+  int ticks = 0;
+  for (; run.step(row_); ++ticks) {
+    ASSERT_NEAR(row_.t_s, ticks * period_s, 1e-9);
+    ASSERT_EQ(row_.truth.size() + row_.real.size(), 0);
+    ASSERT_FALSE(row_.tip);
+  }
+  EXPECT_NEAR(ticks * period_s, 2.0, 0.02);
+  EXPECT_EQ(run.malformed(), 0);
+  EXPECT_EQ(run.log().damage_count(), 0);
+}
+
+TEST_F(RecordedAtRest, ATickThatIsNotLoggedLeavesTheRowAlone) {
+  LoggedRun run(experiment_, path_);
+  row_.t_s = -7.0;
+  ASSERT_TRUE(run.step(row_, false));
+  EXPECT_EQ(row_.t_s, -7.0);
+  ASSERT_TRUE(run.step(row_));
+  EXPECT_NEAR(row_.t_s, to_seconds(run.pipeline().period_ns()), 1e-9);
+}
+
+/// What damage makes of a logger's stamp is no time: nanoseconds of it would overflow.
+TEST_F(RecordedAtRest, AStampThatIsNoTimeCostsItsFrameAlone) {
+  const std::string whole = log();
+  const std::size_t second = whole.find("\xED\xA1\xDA\x01", 4);
+  ASSERT_NE(second, std::string::npos);
+  for (const char top : {'\x40', '\x90'}) {
+    std::string bytes = whole;
+    bytes[second + 12] = top;  // of the stamp's eight bytes
+    write(bytes);
+    EXPECT_GT(active_s(), 1.5);
+    LoggedRun run(experiment_, path_);
+    while (run.step(row_, false)) {
+    }
+    EXPECT_EQ(run.malformed(), 1);
+    EXPECT_EQ(run.log().damage_count(), 0);
+  }
+}
+
+TEST_F(RecordedAtRest, DamageIsSteppedOverAndReported) {
+  std::string bytes = log();
+  bytes.replace(bytes.size() / 2, 500, std::string(500, 'x'));
+  write(bytes);
+  LoggedRun run(experiment_, path_);
+  int ticks = 0;
+  while (run.step(row_)) ++ticks;
+  EXPECT_NEAR(ticks / experiment_.rate_hz, 2.0, 0.02);
+  EXPECT_EQ(run.log().damage_count(), 1);
+  EXPECT_NE(run.log().damage_text().find("damaged"), std::string::npos);
+}
+
+TEST_F(RecordedAtRest, ALogWithoutAFrameOfThisArmIsRefused) {
+  experiment_.transport.lcm.mocap_channel = "ANOTHER";
+  try {
+    LoggedRun run(experiment_, path_);
+    FAIL() << "expected an error";
+  } catch (const std::runtime_error& error) {
+    EXPECT_NE(std::string(error.what()).find("no frame on channel ANOTHER"), std::string::npos)
+        << error.what();
+  }
+  EXPECT_THROW(LoggedRun(experiment_, path_ + "_not_there"), std::runtime_error);
+  EXPECT_THROW(LoggedRun(experiment_, std::filesystem::temp_directory_path()), std::runtime_error);
 }
 
 }  // namespace
