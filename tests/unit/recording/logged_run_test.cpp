@@ -13,6 +13,7 @@
 #include "softarm/config/load.hpp"
 #include "softarm/simulation/simulated_arm.hpp"
 #include "softarm/transport/mocap_adapter.hpp"
+#include "softarm/transport/softarm_mocap.hpp"
 
 namespace softarm {
 namespace {
@@ -25,11 +26,13 @@ class RecordedAtRest : public ::testing::Test {
     SimulatedArm arm(experiment_.plant, 0);
     const MocapAdapter adapter(experiment_.transport.bodies, experiment_.arm,
                                experiment_.transport.mocap);
+    const auto sent = std::make_unique<SentFrame>();
     softarm_messages::mocap_frame_t message;
     for (std::int64_t time_ms = 0; time_ms < 2000; ++time_ms) {
       arm.advance_to(1'000'000 * time_ms);
       for (MocapFrame frame; arm.receive(frame);) {
-        adapter.to_message(frame, frame.capture_ns / 1000, message);
+        adapter.to_sent(frame, frame.capture_ns / 1000, *sent);
+        to_message(*sent, message);
         std::string bytes(static_cast<std::size_t>(message.getEncodedSize()), '\0');
         message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
         lcm::LogEvent event{.eventnum = 0,

@@ -60,7 +60,7 @@ void patient(Experiment& e) {
 }
 
 void fast(Experiment& e) {
-  auto paper = std::get<PaperReference>(e.reference.phases.at(0).kind);
+  auto paper = *e.reference.phases.at(0).kind.get_if<PaperReference>();
   paper.rate_radps = 8.0;
   e.reference.phases.at(0).kind = paper;
 }
@@ -129,8 +129,8 @@ std::vector<RobustnessScene> robustness_scenes() {
     push.duration_s = 0.5;
     e.plant.loads.push_back(push);
   });
-  add("links plant", 1.0, [](Experiment& e) { e.plant.kind = PlantKind::links; });
-  add("refined plant", 1.0, [](Experiment& e) { e.plant.kind = PlantKind::refined; });
+  add("links plant", 1.0, [](Experiment& e) { e.plant.kind = LinkSettings{}; });
+  add("refined plant", 1.0, [](Experiment& e) { e.plant.kind = RefinedSettings{}; });
   add("hysteresis 15 %", 5.0, [](Experiment&) {}).faults.hysteresis = 0.15;
   LoopFaults& play = add("valve play 12.5 mbar, steps 10 mbar", 7.0, [](Experiment&) {}).faults;
   play.play_bar = 0.0125;

@@ -9,6 +9,7 @@
 
 #include "softarm/model/kinematics.hpp"
 #include "softarm/transport/mocap_adapter.hpp"
+#include "softarm/transport/softarm_mocap.hpp"
 #include "unit/recording/recorded_log.hpp"
 
 namespace softarm {
@@ -27,6 +28,7 @@ class MotionLog : public ::testing::Test {
     const LcmSettings& lcm = experiment_.transport.lcm;
     const MocapAdapter adapter(experiment_.transport.bodies, experiment_.arm,
                                experiment_.transport.mocap);
+    const auto sent = std::make_unique<SentFrame>();
     test::LogBytes log;
     for (std::int64_t k = 0; k < kFrames; ++k) {
       const std::int64_t time_us = kStart_us + kFrame_us * k;
@@ -43,7 +45,8 @@ class MotionLog : public ::testing::Test {
       frame.body[0] = {arm.base_position_m, Eigen::Quaterniond(arm.base_rotation), true};
       frame.body[1] = {end[0].translation(), Eigen::Quaterniond(end[0].linear()), true};
       softarm_messages::mocap_frame_t message;
-      adapter.to_message(frame, time_us, message);
+      adapter.to_sent(frame, time_us, *sent);
+      to_message(*sent, message);
       log.add_message(lcm.mocap_channel, message, time_us);
     }
     bytes_ = log.bytes;

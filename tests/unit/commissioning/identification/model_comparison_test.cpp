@@ -12,20 +12,20 @@
 namespace softarm {
 namespace {
 
-/// An arm that creeps: u' = (push - k b - c |b|^2 b) / beta, b = u - rest, behind a lag.
+/// An arm that creeps: u' = (input_map - k b - c |b|^2 b) / beta, b = u - rest, behind a lag.
 struct Creeper {
   double k = 1.0, beta = 0.5, cubic = 0.0, lag_s = 0.0;
   Eigen::Vector2d rest = Eigen::Vector2d::Zero();
-  Eigen::Matrix<double, 2, 4> push;
+  Eigen::Matrix<double, 2, 4> input_map;
 
   Creeper() {
     for (int j = 0; j < 4; ++j) {  // 35 degrees off where they are said to be
       const double angle = 0.6 + M_PI / 2 * j, gain = 0.2 + 0.03 * j;
-      push.col(j) << -gain * std::cos(angle), -gain * std::sin(angle);
+      input_map.col(j) << -gain * std::cos(angle), -gain * std::sin(angle);
     }
   }
 
-  /// Pressures of three incommensurate periods each, from 1 s on; `gain(t)` scales what they push.
+  /// Pressures of three incommensurate periods each, from 1 s on; `gain(t)` scales what they input_map.
   template <class Gain>
   MotionRecord record(double seconds, const Gain& gain) const {
     constexpr int kSteps = 50;  // of 1 ms, from frame to frame
@@ -54,7 +54,7 @@ struct Creeper {
         const Eigen::Vector4d next =
             lag_s > 0.0 ? Eigen::Vector4d(now + std::exp(-h / lag_s) * (behind - now)) : now;
         const Eigen::Vector2d force =
-            gain(out.time_s[i]) * push * (lag_s > 0.0 ? 0.5 * (behind + next) : now);
+            gain(out.time_s[i]) * input_map * (lag_s > 0.0 ? 0.5 * (behind + next) : now);
         const auto rate = [&](const Eigen::Vector2d& at) -> Eigen::Vector2d {
           const Eigen::Vector2d b = at - rest;
           return (force - k * b - cubic * b.squaredNorm() * b) / beta;
