@@ -102,7 +102,7 @@ ModelComparison compare_models(const Experiment& experiment, const MotionRecord&
       for (SegmentParameters& segment : start.arm.segments)
         segment.damping_nms_per_rad = kUndamped_s * segment.stiffness_nm_per_rad;
     const ParameterSet set(start, experiment.actuation.kind, variant.choice);
-    // What has a term more begins with the simplest of its kind: more terms are never worse.
+    // A model with more terms starts from the simplest of its kind, so that it is never worse.
     const CrossValidation* simpler = nullptr;
     for (const ModelTrial& trial : out.trials)
       if (trial.damping == variant.choice.damping) {

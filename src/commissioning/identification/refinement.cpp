@@ -15,7 +15,7 @@
 namespace softarm {
 namespace {
 
-constexpr double kHeldAbove = 1.0;        ///< standard error of a combination that is not told
+constexpr double kHeldAbove = 1.0;  ///< standard error of a combination that is not determined
 constexpr double kNoiseFloor_rad = 1e-9;  ///< no motion capture is better
 constexpr int kWeightings = 3;
 constexpr double kSame = 1e-4;         ///< squared standard errors: a hundredth of one
@@ -154,7 +154,7 @@ class Search {
     return (whiten_ * (measured_ - u)).squaredNorm() / inflation_ + prior;
   }
 
-  /// The information in all that is known, and its eigenvectors in falling order.
+  /// The total information, and its eigenvectors in descending order.
   void decompose(const Eigen::MatrixXd& J, Refinement& out) const {
     Eigen::MatrixXd information = J.transpose() * J / inflation_;
     if (options_.prior > 0.0)
@@ -177,7 +177,7 @@ class Search {
     if (options_.prior > 0.0) gradient += (believed_ - out.x) / (options_.prior * options_.prior);
     for (Eigen::Index i = 0; i < out.x.size(); ++i) {
       if (out.x[i] > lowest_[i] || gradient[i] > 0.0) continue;
-      J.col(i).setZero();  // rests against its limit
+      J.col(i).setZero();  // is at its limit
       gradient[i] = 0.0;
     }
     decompose(J, out);
