@@ -19,12 +19,12 @@ double distance_rad(const ParameterSet& set, const MotionRecord& record, const E
 
 Refinement identify(const ParameterSet& set, const MotionRecord& record,
                     const IdentifyOptions& options) {
-  const Eigen::VectorXd believed = set.believed();
+  const Eigen::VectorXd configured = set.believed();
   const LinearFit start =
-      fit_linear_and_lag(set, record, believed, options.window_s, options.longest_lag_s);
+      fit_linear_and_lag(set, record, configured, options.window_s, options.longest_lag_s);
   // With noise and smoothing, a motion with little information may give nonsense: take the nearest.
-  Eigen::VectorXd nearest = believed;
-  double least_rad = distance_rad(set, record, believed);
+  Eigen::VectorXd nearest = configured;
+  double least_rad = distance_rad(set, record, configured);
   const auto consider = [&](const Eigen::VectorXd& x) {
     const double distance = distance_rad(set, record, x);
     if (distance >= least_rad) return;
