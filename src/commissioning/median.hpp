@@ -1,4 +1,4 @@
-// The middle of many numbers.
+// The median of a list of numbers.
 #pragma once
 
 #include <algorithm>
@@ -7,7 +7,7 @@
 
 namespace softarm {
 
-/// Of two in the middle the larger; at least one value.
+/// The upper median; requires at least one value.
 inline double median(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());

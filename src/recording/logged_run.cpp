@@ -18,7 +18,7 @@ LoggedRun::LoggedRun(const Experiment& experiment, const std::filesystem::path& 
       log_(log) {
   if (!read_frame())
     throw std::runtime_error(fmt::format(
-        "{} holds no frame on channel {}; daemon.lcm.mocap_channel says which to look for",
+        "{} holds no frame on channel {}; daemon.lcm.mocap_channel is the channel to look for",
         log.string(), mocap_.channels().front()));
   start_ns_ = next_arrival_ns_;
 }

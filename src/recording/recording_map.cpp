@@ -139,7 +139,7 @@ void check(const ConfigKeys& reader, const NamedMap& named, RecordingMap& map) {
   for (std::size_t i = 0; i < named.segments.size(); ++i) {
     const int id = named.segments[i].id;
     if (std::find(ids.begin(), ids.end(), id) != ids.end()) {
-      throw reader.error_at(fmt::format("segments[{}].id", i), "an id of its own",
+      throw reader.error_at(fmt::format("segments[{}].id", i), "a distinct id",
                             fmt::format("{} again", id));
     }
     ids.push_back(id);
@@ -157,7 +157,7 @@ void check(const ConfigKeys& reader, const NamedMap& named, RecordingMap& map) {
   }
   const Eigen::Matrix3d& R = map.base_rotation;
   if (!(R * R.transpose()).isIdentity(1e-6) || R.determinant() < 0.0) {
-    throw reader.error_at("rest.base_rotation", "a rotation", "a matrix that is none");
+    throw reader.error_at("rest.base_rotation", "a rotation", "a matrix that is not a rotation");
   }
 }
 

@@ -28,7 +28,8 @@ std::string damage_text(const ReplaySummary& summary, const EventLogReader& log,
     text += fmt::format("damage: bytes {} to {} of {} hold no whole message\n", each.begin,
                         each.end, log_name);
   return text + fmt::format(
-                    "{} damaged stretches, {} bytes; {} messages on our channels that are none; "
+                    "{} damaged stretches, {} bytes; {} messages on our channels that could not be "
+                    "decoded; "
                     "what precedes and follows them was used\n",
                     log.damage_count(), log.damaged_bytes(), summary.malformed);
 }

@@ -222,7 +222,7 @@ class Preflight(unittest.TestCase):
         self.assertIsInstance(told, tuple, told)
         code, report, errors = told
         self.assertEqual(code, 1, report + errors)
-        self.assertRegex(report, rf"(?m)^FAIL +{check} .*{text}.*\. Mend: .+", errors)
+        self.assertRegex(report, rf"(?m)^FAIL +{check} .*{text}.*\. Fix: .+", errors)
         if others_pass:
             self.assertEqual(len(re.findall("^FAIL", report, flags=re.MULTILINE)), 1, report)
 
@@ -251,14 +251,14 @@ class Preflight(unittest.TestCase):
                 self.assertEqual(json.loads(report)["failed"], 1)
 
     def test_jitter(self):
-        self.expect("jitter", "jitter", r"HOLD after 100\.0 ms, which would have come")
+        self.expect("jitter", "jitter", r"HOLD after 100\.0 ms, which would have occurred")
 
     def test_units(self):
         self.expect("units", "units", "positions come in millimetres")
         self.assertIn("no chamber was filled", self.told["units"][2])
 
     def test_order_of_the_quaternion(self):
-        self.expect("quaternions", "quaternions", "w, x, y, z and x, y, z, w are taken for one another")
+        self.expect("quaternions", "quaternions", "w, x, y, z and x, y, z, w are interchanged")
 
     def test_other_sources(self):
         self.expect("optitrack", "world axes", "should be -z", others_pass=False)

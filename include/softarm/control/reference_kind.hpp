@@ -103,6 +103,7 @@ concept TipReferencePath = AnyReference<K> && requires(const K& kind, double tim
 
 struct LiveReference;  // what comes from outside: Reference itself knows how to follow it
 
+/// What a kind of reference is, behind ReferenceKind.
 class ReferenceInterface {
  public:
   virtual ~ReferenceInterface() = default;

@@ -38,6 +38,7 @@ struct BaseMotion {
 /// across a step: `until` returns when, `enter` sets what holds from an instant on.
 class ExternalLoads {
  public:
+  /// A load with its time window, s.
   struct Load {
     int segment;  ///< from 0
     Eigen::Vector3d force_n, moment_nm;

@@ -28,6 +28,7 @@ concept AnyPlant = requires(const K& kind, const PlantSettings& settings) {
   { kind.make(settings) } -> std::same_as<std::unique_ptr<PlantSystem>>;
 };
 
+/// What a kind of plant is, behind PlantKind.
 class PlantInterface {
  public:
   virtual ~PlantInterface() = default;

@@ -15,6 +15,7 @@ class SecondOrderSystem {
   using ConstVector = const Eigen::Ref<const Eigen::VectorXd>&;
   using Matrix = Eigen::Ref<Eigen::MatrixXd>;
 
+  /// Powers of the equation of motion, W.
   struct Powers {
     double supplied_w = 0.0;    ///< by actuation and external forces
     double dissipated_w = 0.0;  ///< by damping, >= 0

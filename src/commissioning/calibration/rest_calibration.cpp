@@ -79,7 +79,7 @@ BodySettings plates_from(const Experiment& experiment, const Eigen::VectorXd& re
 
 std::string body_name(std::size_t i) { return i == 0 ? "base" : fmt::format("segment {}", i); }
 
-/// Poses of every body over time; of a fixed base one.
+/// Poses of every body over time; one pose of a fixed base.
 std::vector<std::vector<TimedPose>> gather(const Experiment& experiment,
                                            const std::vector<MocapFrame>& frames) {
   const auto bodies = static_cast<std::size_t>(experiment.arm.size()) + 1;
@@ -105,8 +105,8 @@ std::vector<std::vector<TimedPose>> gather(const Experiment& experiment,
     if (unseen[i] > 0)
       who += fmt::format("; {} was not seen (or sent no pose) in {}", body_name(i), unseen[i]);
   throw std::runtime_error(fmt::format(
-      "expected at least {} frames with every body, got {} of {}{}; daemon.bodies says which "
-      "bodies are looked for, a longer --duration looks longer",
+      "expected at least {} frames with every body, got {} of {}{}; see daemon.bodies for the "
+      "expected bodies, or give a longer --duration",
       kFewestFrames, out[0].size(), frames.size(), who));
 }
 
@@ -116,14 +116,15 @@ void expect_still(const std::vector<PoseStatistics>& bodies) {
     const PoseStatistics& body = bodies[i];
     if (body.still()) continue;
     moving += fmt::format(
-        "{} strays {:.2f} mm and {:.1f} mrad from its mean (limits {:.2f} mm, {:.1f} mrad); ",
+        "{} is out of tolerance: {:.2f} mm and {:.1f} mrad from its mean (limits {:.2f} mm, {:.1f} "
+        "mrad); ",
         body_name(i), 1e3 * body.wander_m, 1e3 * body.wander_rad, 1e3 * body.wander_limit_m,
         1e3 * body.wander_limit_rad);
   }
   if (!moving.empty())
     throw std::runtime_error("the arm moves: " + moving +
                              "let it hang without pressure (softarm disarm) until it is still, and "
-                             "see that no plate is loose");
+                             "check that no marker is loose");
 }
 
 std::vector<Eigen::Isometry3d> means(const std::vector<std::vector<TimedPose>>& poses, bool fixed,
@@ -145,7 +146,7 @@ std::vector<Eigen::Isometry3d> means(const std::vector<std::vector<TimedPose>>& 
 
 std::string bodies_text(const RestCalibration& found) {
   std::string text = fmt::format("{:<12}{:>7}{:>22}{:>26}{:>24}\n", "body", "frames",
-                                 "spread an axis", "error of the mean", "strays at most");
+                                 "spread an axis", "error of the mean", "largest deviation");
   for (std::size_t i = 0; i < found.body.size(); ++i) {
     const PoseStatistics& body = found.body[i];
     if (body.frames == 0) continue;
@@ -161,7 +162,7 @@ std::string bodies_text(const RestCalibration& found) {
 
 std::string plates_text(const BodySettings& before, const RestCalibration& found) {
   std::string text =
-      "\nplates: where S_i sits on its body, and how far that is from what was configured\n";
+      "\nmarker frames: pose of S_i on its body, and the distance from the configured one\n";
   for (std::size_t i = before.base_id < 0 ? 1 : 0; i < found.body.size(); ++i) {
     const MarkerFrameSettings& now =
         i == 0 ? found.bodies.base_plate : found.bodies.segment_plates[i - 1];
@@ -195,7 +196,8 @@ std::string readings_text(const RestCalibration& found) {
                                     1e3 * found.rest_u_rad[k + 1]),
                         reading(found.before[i]), reading(found.after[i]));
   }
-  return text + "(after: the second half of the frames, with plates that the first half gave)\n";
+  return text +
+         "(after: the second half of the frames, with the marker frames from the first half)\n";
 }
 
 }  // namespace
@@ -234,15 +236,13 @@ std::string calibration_text(const Experiment& experiment, const RestCalibration
       bodies_text(found) + plates_text(experiment.transport.bodies, found) + readings_text(found);
   if (experiment.transport.bodies.base_id >= 0)
     text += fmt::format(
-        "\nthe arm's axis at the base was {:.2f} mrad from arm.base.rotation, which tells the "
-        "model "
-        "where down is; --base arm trusts that instead\n",
+        "\nthe arm's axis at the base was {:.2f} mrad from arm.base.rotation, which "
+        "gives the model the direction of gravity; --base arm uses that instead\n",
         1e3 * found.base_tilt_rad);
   text +=
-      "not told by a still arm: where the base itself is and which way it is turned about the "
-      "arm's "
-      "axis (so the direction phi = 0), and lengths: what is wrong with them is now in the "
-      "plates\n";
+      "not determined by an arm at rest: the position of the base, its rotation about the arm's "
+      "axis "
+      "(so the direction phi = 0), and lengths: their errors are now part of the marker frames\n";
   return text;
 }
 

@@ -33,7 +33,7 @@ std::string list(int count, const Value& value) {
   return text + "]";
 }
 
-/// Chambers as they push.
+/// The chambers with the angles and gains of the input map.
 std::string chambers_yaml(const ArmHypothesis& arm, const char* indent) {
   std::string text;
   for (int i = 0; i < arm.arm.size(); ++i) {
@@ -98,11 +98,11 @@ std::string conditioning_text(const ParameterSet& set, const Refinement& fit) {
   if (kept > 0)
     text += fmt::format(
         "singular values {:.3g} to {:.3g} (1 over one is the standard error of its combination); "
-        "told least: {}\n",
+        "least determined: {}\n",
         fit.singular_values[0], fit.singular_values[kept - 1],
         combination_text(set, fit.combinations.col(kept - 1)));
   for (Eigen::Index i = kept; i < set.size(); ++i)
-    text += fmt::format("not told by this record, left as configured: {}\n",
+    text += fmt::format("not determined by this record, left as configured: {}\n",
                         combination_text(set, fit.combinations.col(i)));
   return text;
 }

@@ -14,7 +14,8 @@
 namespace softarm {
 namespace {
 
-constexpr double kRidge = 1e-6;  ///< of the mean information: holds what the motion does not tell
+constexpr double kRidge =
+    1e-6;  ///< of the mean information: keeps what the motion does not determine
 
 /// A Hann window and its first two derivatives, sampled; each sums to what it does to 1, t, t^2
 /// / 2.
@@ -43,7 +44,7 @@ struct SmoothingKernel {
   Eigen::Index half() const { return value.size() / 2; }
 };
 
-/// The record on an even grid, as motion and its derivatives at every half window.
+/// The record on an even grid: the motion and its derivatives at every half window.
 struct SmoothMotion {
   std::vector<Eigen::VectorXd> u, velocity, acceleration, input;
 };
@@ -97,7 +98,7 @@ SmoothMotion smooth(const MotionRecord& record, double window_s, double lag_s, d
   return out;
 }
 
-/// What (16) leaves over, every instant below the other: B u'' + C u' + G + D u' + springs - push.
+/// The residual of (16), instants stacked: B u'' + C u' + G + D u' + springs - input.
 Eigen::VectorXd leftover(const ArmHypothesis& arm, const SmoothMotion& motion) {
   const Eigen::Index dof = arm.arm.dof();
   DynamicsWorkspace workspace(arm.arm);
@@ -138,7 +139,8 @@ LinearFit fit_linear(const ParameterSet& set, const MotionRecord& record,
   }
   Eigen::MatrixXd information = X.transpose() * X;
   const double typical = information.trace() / static_cast<double>(X.cols());
-  if (!(typical > 1e-12)) throw std::runtime_error("the arm does not move: nothing can be told");
+  if (!(typical > 1e-12))
+    throw std::runtime_error("the arm does not move: nothing can be identified");
   information.diagonal().array() += kRidge * typical;
   const Eigen::LDLT<Eigen::MatrixXd> ldlt(information);
   const Eigen::VectorXd change = ldlt.solve(-X.transpose() * before);
@@ -175,7 +177,7 @@ LinearFit fit_linear_and_lag(const ParameterSet& set, const MotionRecord& record
       Eigen::VectorXd tried = start;
       tried[i] = lag_s / set[i].scale;
       const LinearFit fit = fit_linear(set, record, tried, window_s);
-      // With other gains the same moments: what is left over counts against them.
+      // Other gains give the same moments: the residual is relative to them.
       if (fit.residual_rms_nm / fit.moment_rms_nm < best.residual_rms_nm / best.moment_rms_nm)
         best = fit;
     }

@@ -53,7 +53,7 @@ class LiveExperiment {
       throw std::runtime_error(other);
   }
 
-  /// With zeros meanwhile: whoever holds the valves gets to know us, and the arm hangs.
+  /// Commands zeros meanwhile: the valve driver accepts us as the sender, and the arm hangs.
   void wait_for_rest() {
     const std::int64_t start_ns = client_.now_ns();
     std::int64_t moved_ns = start_ns;

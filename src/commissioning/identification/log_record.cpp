@@ -68,7 +68,7 @@ class LogReader {
                            : take_pressures(event.data, measurement_message_, *arrival_ns));
     if (!used) ++malformed_;
   }
-  /// Messages on the channels read that are none.
+  /// Messages on our channels that could not be decoded.
   std::int64_t malformed() const { return malformed_; }
 
   MotionRecord record(const std::string& path) const {
@@ -76,7 +76,7 @@ class LogReader {
     if (frames_.time_s.size() < kFewest)
       throw std::runtime_error(
           fmt::format("{}: expected at least {} frames with every segment on {}, got {}; "
-                      "daemon.lcm.mocap_channel and daemon.bodies say where to look",
+                      "see daemon.lcm.mocap_channel and daemon.bodies",
                       path, kFewest, mocap_.channels().front(), frames_.time_s.size()));
     if (inputs_.time_s.size() < 2)
       throw std::runtime_error(fmt::format(
@@ -100,7 +100,7 @@ class LogReader {
     return 1e-6 * static_cast<double>(time_ns / 1000 - start_us_);
   }
 
-  /// False where the message is none.
+  /// False if the message could not be decoded.
   bool take_frame(std::size_t channel, std::span<const std::byte> bytes, std::int64_t arrival_ns) {
     arrival_ns_ = std::max(arrival_ns_, arrival_ns);
     const MocapReceipt receipt = mocap_.take(channel, bytes, arrival_ns_, frame_);
@@ -156,8 +156,9 @@ LoggedMotion read_log(const Experiment& experiment, const std::filesystem::path&
   for (LogEvent event; events.next(event);) reader.take(event);
   std::string damage = events.damage_text();
   if (reader.malformed() > 0)
-    damage += fmt::format("{}{} messages on the channels read are none, or have no time",
-                          damage.empty() ? "" : "; ", reader.malformed());
+    damage +=
+        fmt::format("{}{} messages on our channels could not be decoded, or have no valid time",
+                    damage.empty() ? "" : "; ", reader.malformed());
   return {reader.record(log.string()), damage};
 }
 

@@ -11,7 +11,7 @@ namespace {
 constexpr double kLeast = 1e-3;       ///< stiffness of an arm that has any, of that configured
 constexpr double kShortest_s = 1e-3;  ///< beta / k of an arm without inertia
 constexpr double kJagged_s = 0.02;
-constexpr double kSlow_s = 0.5;       ///< at least of that order are the times of slow motion
+constexpr double kSlow_s = 0.5;       ///< scale of lag and delay in quasi-static motion
 constexpr double kHardens_rad = 0.2;  ///< a cubic stiffness of its scale doubles k at that bend
 constexpr double kLagScale_s = 0.1, kDelayScale_s = 0.05, kRestScale_rad = 0.1;
 
@@ -143,7 +143,8 @@ void ParameterSet::add_times(const FitChoice& choice) {
   if (choice.delay)
     number("delay", "s", std::max(start_.dead_time_s, choice.inertia ? kDelayScale_s : kSlow_s),
            &ArmHypothesis::dead_time_s, kUnbounded);
-  // Recorded inputs are jagged: what a delay does is told over more than one of their steps.
+  // Recorded inputs are jagged: the effect of a delay needs a difference over several of their
+  // steps.
   if (choice.delay && !choice.inertia)
     parameters_.back().difference = kJagged_s / parameters_.back().scale;
 }

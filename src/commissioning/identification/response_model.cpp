@@ -15,7 +15,7 @@
 namespace softarm {
 namespace {
 
-constexpr double kLargest_rad = 20.0;     ///< a response beyond it has lost its arm
+constexpr double kLargest_rad = 20.0;     ///< a response beyond it is not that of an arm
 constexpr double kFastest_1ps = 40000.0;  ///< beyond it a simulation takes too long
 constexpr double kStep = 2.0;  ///< times the fastest mode's time constant; stable below 2.78
 
@@ -55,7 +55,7 @@ class Motion {
     return forward_dynamics(plain_, workspace_, u, v, force_, a);
   }
 
-  /// What is left of the static balance: G + springs - push.
+  /// Residual of the static balance: G + springs - input.
   void imbalance(const Eigen::VectorXd& u, const Eigen::VectorXd& input, Eigen::VectorXd& out) {
     push_force(arm_, u, input, force_);
     spring_force(arm_, u, spring_);

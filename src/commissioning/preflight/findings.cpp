@@ -41,7 +41,7 @@ std::string report_text(std::span<const Finding> findings) {
   std::string text;
   for (const Finding& each : findings)
     text += fmt::format("{:<11}  {:<16}  {}{}{}\n", name(each.verdict), each.check, each.text,
-                        each.cure.empty() ? "" : ". Mend: ", each.cure);
+                        each.cure.empty() ? "" : ". Fix: ", each.cure);
   return text + fmt::format("{} passed, {} failed, {} not checked\n",
                             count(findings, Verdict::pass), count(findings, Verdict::fail),
                             count(findings, Verdict::not_checked));

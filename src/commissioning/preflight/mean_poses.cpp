@@ -28,7 +28,7 @@ MeanPoses mean_poses(const Observation& seen, std::int64_t from_ns, std::int64_t
     out.body[i] = {.position_m = mean[i].position_m(),
                    .orientation = mean[i].orientation(),
                    .valid = mean[i].quaternion_length() > 0.0};
-    // As long as the quaternions are: they should be of length one.
+    // With the mean length of the quaternions, which should be one.
     out.body[i].orientation.coeffs() *= mean[i].quaternion_length();
     out.seen[i] = static_cast<double>(mean[i].count()) / out.frames;
   }

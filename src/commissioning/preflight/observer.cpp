@@ -39,7 +39,7 @@ const Observation& Observer::seen() {
   return seen_;
 }
 
-/// Comes before what the client makes of the message: the frame that it completes, if it does.
+/// Called before the client decodes the message, and so before the frame that it may complete.
 void Observer::take_message(const ArmMessage& message) {
   const auto channel = in_other_order_.find(message.channel);
   if (!channel) return;
@@ -49,7 +49,7 @@ void Observer::take_message(const ArmMessage& message) {
 }
 
 void Observer::take_frame(const CapturedFrame& captured) {
-  // One that was waiting for a body is overdue in either order.
+  // A frame that was waiting for a body is overdue in either order.
   if (!other_is_complete_) in_other_order_.overdue(captured.arrival_ns, other_frame_);
   other_is_complete_ = false;
   const auto bodies = client_.experiment().arm.size() + 1;
@@ -61,7 +61,7 @@ void Observer::take_frame(const CapturedFrame& captured) {
                           {other_frame_.body.begin(), other_frame_.body.begin() + bodies}});
 }
 
-/// Bodies that nobody configured.
+/// Notes bodies that are not configured.
 void Observer::note_ids(std::span<const std::byte> bytes) {
   softarm_messages::mocap_frame_t message;
   if (client_.experiment().transport.mocap.source != softarm_mocap() || !decode(bytes, message))

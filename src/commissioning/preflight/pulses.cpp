@@ -72,7 +72,7 @@ std::string play_pulses(ArmClient& client, Observer& observer, const PulsePlan& 
   const Experiment& experiment = client.experiment();
   const ActuationSettings& actuation = experiment.actuation;
   Player player(client, observer, stop);
-  player.rest(1.0);  // whoever holds the valves gets to know us with zeros
+  player.rest(1.0);  // with zeros, so that the valve driver accepts us as the sender
   int valve = 0;
   for (int i = 0; i < experiment.arm.size(); ++i) {
     const auto chambers = static_cast<int>(actuation.segments[static_cast<std::size_t>(i)].size());

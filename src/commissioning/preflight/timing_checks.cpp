@@ -19,7 +19,7 @@ constexpr double kSeenEnough = 0.99;        ///< of the frames
 constexpr double kRateTolerance = 0.05;     ///< of the period
 constexpr double kMissingTolerance = 0.01;  ///< of the frames
 constexpr double kLatencyTolerance_s = 0.002;
-constexpr double kLongestLatency_s = 1.0;  ///< more than that is two clocks
+constexpr double kLongestLatency_s = 1.0;  ///< a longer latency means two clocks
 
 std::string body_name(std::size_t index, const TransportSettings& transport) {
   const BodySettings& bodies = transport.bodies;
@@ -43,9 +43,9 @@ Finding check_bodies(const Experiment& experiment, const Observation& seen) {
     out.verdict = Verdict::fail;
     out.text = fmt::format("no frame on {} within {:.1f} s", channels, listened_s);
     if (seen.not_frames > 0)
-      out.text += fmt::format(", but {} packets that are no frame", seen.not_frames);
+      out.text += fmt::format(", but {} packets that are not frames", seen.not_frames);
     out.cure = fmt::format(
-        "start the sender of frames, or mend transport.mocap.source; it must publish on {} at {}",
+        "start the sender of frames, or fix daemon.mocap.source; it must publish on {} at {}",
         channels, lcm.url);
     return out;
   }
@@ -120,7 +120,7 @@ Finding check_rate(const Experiment& experiment, const Times& times) {
   } else if (missing > kMissingTolerance) {
     out.verdict = Verdict::fail;
     out.cure =
-        "a wired network of its own between camera host and this machine; a receive buffer "
+        "a separate wired network between camera host and this machine; a receive buffer "
         "that holds the frames";
   } else {
     out.verdict = Verdict::pass;
@@ -144,19 +144,20 @@ Finding check_jitter(const Experiment& experiment, const Times& times) {
     longest_s = std::max(longest_s, gap_s);
     late += gap_s + safety.frame_latency_s > hold_s ? 1 : 0;
   }
-  out.text = fmt::format("frames arrive at most {:.1f} ms after one another", 1e3 * longest_s);
+  out.text = fmt::format("frames arrive at most {:.1f} ms apart", 1e3 * longest_s);
   if (times.stamped)
-    out.text += fmt::format(", their way varies by {:.1f} ms", 1e3 * (most_s - least_s));
+    out.text += fmt::format(", with a jitter of {:.1f} ms", 1e3 * (most_s - least_s));
   out.text += fmt::format("; HOLD after {:.1f} ms", 1e3 * hold_s);
   out.verdict = late > 0 ? Verdict::fail : Verdict::pass;
   if (late > 0) {
-    out.text += fmt::format(", which would have come {} times", late);
-    out.cure = "quieten the network and this machine, or raise safety.hold_after_s";
+    out.text += fmt::format(", which would have occurred {} times", late);
+    out.cure =
+        "reduce the load on the network and this machine, or raise daemon.safety.hold_after_s";
   }
   return out;
 }
 
-/// Least time from stamp to arrival, if the stamps are of one of our clocks.
+/// Shortest time from stamp to arrival, if the stamps are from one of our clocks.
 std::optional<double> least_latency_s(const Observation& seen, std::string& clock) {
   std::int64_t least_ns = kForever;
   for (const SeenFrame& frame : seen.frames)
@@ -182,14 +183,15 @@ Finding check_latency(const Experiment& experiment, const Observation& seen, con
     }
     out.verdict = Verdict::fail;
     out.text = "the sender's time stamps do not advance";
-    out.cure = "stamp every frame at exposure, or transport.capture_time: latency";
+    out.cure = "stamp every frame at exposure, or daemon.capture_time: latency";
     return out;
   }
   std::string clock;
   const std::optional<double> least_s = least_latency_s(seen, clock);
   if (!least_s) {
     out.text = fmt::format(
-        "the sender's clock is none of ours, so only changes of latency show (see jitter); {:.1f} "
+        "the sender's clock is not one of ours, so only changes of latency show (see jitter); "
+        "{:.1f} "
         "ms declared",
         1e3 * declared_s);
     return out;

@@ -22,7 +22,7 @@ std::string chamber_name(int segment, int chamber) {
   return fmt::format("chamber {} of segment {}", chamber + 1, segment + 1);
 }
 
-/// The chamber of the segment it acts on whose angle fits what was measured; -1 where none does.
+/// The chamber, of the segment it acts on, whose angle fits the measurement; -1 if there is none.
 int acts_like(const Experiment& experiment, const PulseResponse& response) {
   const auto& chambers = experiment.actuation.segments[static_cast<std::size_t>(response.segment)];
   for (std::size_t j = 0; j < chambers.size(); ++j)
@@ -33,7 +33,7 @@ int acts_like(const Experiment& experiment, const PulseResponse& response) {
 
 using Responses = std::vector<PulseResponse>;
 
-/// What one mistake would explain in every chamber; empty where none does.
+/// The single mistake that explains all chambers; empty if there is none.
 std::string common_cause(const Responses& responses, std::string& cure) {
   const auto all = [&](auto&& holds) {
     return std::all_of(responses.begin(), responses.end(), holds);
@@ -84,7 +84,8 @@ std::string one_problem(const Experiment& experiment, const PulseResponse& respo
   return "";
 }
 
-/// valves.order under which every chamber is what it acts as; empty where that is no rearrangement.
+/// The valves.order with which every chamber acts as configured; empty if that is not a
+/// permutation.
 std::vector<int> mended_order(const Experiment& experiment, const Responses& responses) {
   std::vector<int> first(1, 0);
   for (const auto& chambers : experiment.actuation.segments)

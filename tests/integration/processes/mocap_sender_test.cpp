@@ -20,7 +20,7 @@ class MocapSender : public ::testing::TestWithParam<const char*>, protected test
 
 TEST_P(MocapSender, MakesTheDaemonActive) {
   write_config(GetParam(), "");
-  const auto daemon = start("softarmd", {"--shadow"});
+  const auto daemon = start("softarmd");
   ASSERT_TRUE(wait_for([&] { return mode() == Mode::wait_frames; })) << daemon->printed();
   const auto sender = start("example_mocap_sender");
   ASSERT_TRUE(wait_for([&] { return mode() == Mode::active; }))

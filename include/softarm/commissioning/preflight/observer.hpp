@@ -1,4 +1,4 @@
-// Keeps what comes of a running arm, for the pre-run checks.
+// Records the messages of a running arm for the pre-run checks.
 #pragma once
 
 #include <set>
@@ -9,17 +9,20 @@
 
 namespace softarm {
 
-/// Takes the client's callbacks for messages, frames, measured pressures and commands; the client
-/// must not handle messages after the observer is gone.
+/// Builds an Observation. Takes the client's callbacks for messages, frames, measured pressures and
+/// commands; the client must not handle messages after the observer is destroyed.
 class Observer {
  public:
+  /// Begins to observe. @param client  must outlive the observer
   explicit Observer(ArmClient& client);
   Observer(const Observer&) = delete;
   Observer& operator=(const Observer&) = delete;
 
-  /// Nothing is commanded by us up to here.
+  /// Marks the end of the time in which we command nothing.
   void rest_ends() { seen_.rest_end_ns = client_.now_ns(); }
+  /// Adds a pulse that was played.
   void add(const Pulse& pulse) { seen_.pulses.push_back(pulse); }
+  /// Everything observed so far.
   const Observation& seen();
 
  private:

@@ -1,4 +1,4 @@
-// Filling one chamber after the other, softly, on the running arm.
+// Fills one chamber after the other at low pressure on the running arm.
 #pragma once
 
 #include <functional>
@@ -8,16 +8,16 @@
 
 namespace softarm {
 
-/// What is played on every chamber in turn.
+/// The pulse played on every chamber in turn.
 struct PulsePlan {
   double pressure_bar = 0.0;  ///< above actuation.min_pressure_bar; 0: soft_pressure_bar
   double hold_s = 0.6;        ///< two thirds to settle, one third to measure
 };
 
-/// Plays a pulse on every chamber and adds them to what `observer` keeps; the arm is vented in the
-/// end. Returns why it ended early, for a person; empty where it did not. It ends where
-///  - `stop` says so (Ctrl-C), a daemon reports that it is armed, or somebody else commands the
-///  arm,
+/// Plays a pulse on every chamber, adds each to the observation of `observer`, and vents the arm at
+/// the end. Returns why it ended early, for a person; empty if it did not. It ends early if
+///  - `stop` returns true (Ctrl-C), a daemon reports that it is armed, or another program commands
+///    the arm,
 ///  - a segment bends beyond identification.max_theta_rad or moves faster than max_speed_radps,
 ///  - no frame shows every segment for 0.2 s, or as long as the daemon would wait before it vents.
 /// @param client  holds the lock on the command channel  @throws TransportError

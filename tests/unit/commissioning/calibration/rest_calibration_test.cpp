@@ -146,9 +146,9 @@ TEST_F(Calibration, AMovingArmIsRefusedWithNumbersAndCure) {
       FAIL() << "20 mrad at 1 Hz";
     } catch (const std::runtime_error& error) {
       const std::string text = error.what();
-      EXPECT_NE(text.find("segment 1 strays"), std::string::npos) << text;
+      EXPECT_NE(text.find("segment 1 is out of tolerance"), std::string::npos) << text;
       EXPECT_NE(text.find("softarm disarm"), std::string::npos) << text;
-      EXPECT_EQ(text.find("base strays"), std::string::npos) << text;
+      EXPECT_EQ(text.find("base is out of tolerance"), std::string::npos) << text;
     }
   }
 }
@@ -233,7 +233,8 @@ TEST_F(Calibration, WhatIsWrittenLoads) {
     EXPECT_LT(radians, 1e-7);
   }
   EXPECT_LT(apart(loaded.base_plate, truth.base_plate).first, 2e-9);
-  EXPECT_NE(calibration_text(experiment, found).find("not told by a still arm"), std::string::npos);
+  EXPECT_NE(calibration_text(experiment, found).find("not determined by an arm at rest"),
+            std::string::npos);
 }
 
 }  // namespace

@@ -165,7 +165,7 @@ TEST(Refinement, SaysWhatARecordDoesNotTell) {
   EXPECT_EQ(fit.held, 2);
   EXPECT_NEAR(fit.x[5], 1.0, 1e-6);  // chamber 4, as configured
   const std::string text = conditioning_text(set, fit);
-  EXPECT_NE(text.find("not told by this record"), std::string::npos) << text;
+  EXPECT_NE(text.find("not determined by this record"), std::string::npos) << text;
   EXPECT_NE(text.find("segment 1 chamber 4"), std::string::npos) << text;
 }
 
@@ -191,7 +191,7 @@ TEST(Refinement, WithoutGravitySlowMotionTellsRatiosOnly) {
   test::add_noise(record, 2e-3, 0.0, 2);
   const Refinement fit = refine(set, record, set.configured(), {});
   ASSERT_GE(fit.held, 1);
-  // All three by the same factor: what is told least.
+  // All three by the same factor: the least determined combination.
   EXPECT_GT(std::abs(fit.combinations.col(2).dot(Eigen::Vector3d::Ones().normalized())), 0.98);
 }
 

@@ -86,7 +86,7 @@ TEST(Preflight, JitterThatTheDaemonWouldHoldFor) {
   const Experiment arm = hanging_arm(1);
   Observation seen = observed(arm);
   for (std::size_t k = 100; k < 110; ++k) seen.frames[k].arrival_ns = seen.frames[110].arrival_ns;
-  EXPECT_TRUE(fails(checked(arm, seen), "jitter", "their way varies by 50.0 ms"));
+  EXPECT_TRUE(fails(checked(arm, seen), "jitter", "with a jitter of 50.0 ms"));
   EXPECT_TRUE(alone(checked(arm, seen), "jitter"));
 }
 
@@ -189,7 +189,7 @@ TEST(Preflight, OrderOfTheQuaternion) {
   Observation seen = observed(arm);
   for_each_body(seen, scalar_last);
   const std::vector<Finding> all = checked(arm, seen);
-  EXPECT_TRUE(fails(all, "quaternions", "taken for one another"));
+  EXPECT_TRUE(fails(all, "quaternions", "interchanged"));
   EXPECT_TRUE(fails(all, "quaternions", "daemon.mocap.quaternion: xyzw"));
   EXPECT_TRUE(alone(all, "quaternions"));
   EXPECT_EQ(obstacle_to_pulses(all), "quaternions");
