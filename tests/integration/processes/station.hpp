@@ -32,7 +32,7 @@ class Station {
     folder_ = std::filesystem::temp_directory_path() / ("softarm_" + text);
     std::filesystem::create_directories(folder_);
     // A port of its own, so that tests may run side by side.
-    url_ = "udpm://239.255.76.67:" + std::to_string(20000 + (8 * getpid() + number) % 40000) +
+    url_ = "udpm://239.255.76.67:" + std::to_string(20000 + (8 * getpid() + number) % 12000) +
            "?ttl=0";
     write_config("paper_arm.yaml", "");
   }
