@@ -47,7 +47,8 @@ def start(test, folder, *command):
     """A process that gets SIGTERM when `test` ends; what it prints goes to FOLDER/PROGRAM.txt."""
     output = open(folder / f"{pathlib.Path(command[0]).name}.txt", "w", encoding="utf-8")
     test.addCleanup(output.close)
-    process = subprocess.Popen(command, stdout=output, stderr=output)
+    # No daemon finds the FAULT of another test.
+    process = subprocess.Popen(command, stdout=output, stderr=output, env={**os.environ, "XDG_STATE_HOME": str(folder)})
 
     def end():
         process.send_signal(signal.SIGTERM)

@@ -31,6 +31,9 @@ class Station {
     const std::string text = std::to_string(getpid()) + "_" + std::to_string(number);
     folder_ = std::filesystem::temp_directory_path() / ("softarm_" + text);
     std::filesystem::create_directories(folder_);
+    // No daemon finds the FAULT of another test.
+    setenv("XDG_STATE_HOME", folder_.c_str(), 1);
+    unsetenv("STATE_DIRECTORY");
     // A port of its own, so that tests may run side by side.
     url_ = "udpm://239.255.76.67:" + std::to_string(20000 + (8 * getpid() + number) % 12000) +
            "?ttl=0";
