@@ -9,10 +9,9 @@ import tempfile
 import time
 import unittest
 
-from running_arm import own_url, skip_without_multicast, start, write_config
+from running_arm import PATIENCE_S, main_at_once, own_url, skip_without_multicast, start, wait_for, write_config
 
 PROGRAMS = pathlib.Path(sys.argv.pop(1))
-PATIENCE_S = 120
 SLEW_BAR_PER_S = 4
 BUSY = "no frame with every segment for"  # on a machine too busy for the simulated arm
 
@@ -58,9 +57,7 @@ class IdentifyLive(unittest.TestCase):
                                         stderr=file)
             try:
                 if meanwhile:
-                    end = time.monotonic() + PATIENCE_S
-                    while "step 1 of" not in told.read_text(encoding="utf-8") and time.monotonic() < end:
-                        time.sleep(0.01)
+                    wait_for(lambda: "step 1 of" in told.read_text(encoding="utf-8"), "the first step")
                     time.sleep(0.3)  # for three times as long as the step rises
                     meanwhile(identify, plant)
                 code = identify.wait(timeout=PATIENCE_S)
@@ -117,4 +114,4 @@ class IdentifyLive(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    unittest.main()
+    main_at_once()

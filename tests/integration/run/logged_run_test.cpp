@@ -10,6 +10,7 @@
 #include "softarm/config/load.hpp"
 #include "softarm/simulation/simulated_arm.hpp"
 #include "softarm/transport/mocap_adapter.hpp"
+#include "test_folder.hpp"
 
 namespace softarm {
 namespace {
@@ -38,7 +39,6 @@ class RecordedAtRest : public ::testing::Test {
       }
     }
   }
-  void TearDown() override { std::filesystem::remove(path_); }
 
   /// Seconds of ACTIVE; the last row is in `row_`.
   double active_s() {
