@@ -83,7 +83,7 @@ function(softarm_tests label module)
   set(usual "*")
   set(lock "")
   if(TESTS_REAL_TIME)
-    set(lock RESOURCE_LOCK real_time)
+    set(lock RESOURCE_LOCK real_time COST 100)  # one after another, so the first of them begins first
   endif()
   if(TESTS_SLOW)
     set(usual "-${TESTS_SLOW}")
