@@ -7,7 +7,7 @@ import sys
 import tempfile
 import unittest
 
-from running_arm import own_url, skip_without_multicast, start, tracks_within, write_config
+from running_arm import PATIENCE_S, own_url, skip_without_multicast, start, tracks_within, write_config
 
 PROGRAMS = pathlib.Path(sys.argv.pop(1))
 # Position in m, rotation vector in rad; the base's plate is known.
@@ -27,7 +27,7 @@ def found_in(calibrated):
 
 class Calibrate(unittest.TestCase):
     def softarm(self, *command):
-        return subprocess.run([PROGRAMS / "softarm", *command], capture_output=True, text=True, timeout=120, check=False)
+        return subprocess.run([PROGRAMS / "softarm", *command], capture_output=True, text=True, timeout=PATIENCE_S, check=False)
 
     def test_plates_that_are_askew_are_found_and_the_arm_tracks(self):
         temporary = tempfile.TemporaryDirectory()

@@ -9,7 +9,7 @@ import sys
 import tempfile
 import unittest
 
-from running_arm import PYTHON, ROOT, go_on_in_our_python, own_url, skip_without_multicast, start, tracks_within, write_config
+from running_arm import PYTHON, ROOT, go_on_in_our_python, main_at_once, own_url, skip_without_multicast, start, tracks_within, write_config
 
 EXAMPLE = ROOT / "examples/republish.py"
 
@@ -85,4 +85,4 @@ class Mocap(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    unittest.main()
+    main_at_once()

@@ -1,6 +1,6 @@
 """softarm check --live and softarm jog against running arms, each wrong by one thing. Argument: folder of the programs.
 
-All arms run at once, and each check on a port of its own: together they take as long as the longest.
+All arms run at once, and each check on a port of its own: together they take as long as the longest, and keys are held meanwhile.
 """
 import json
 import os
@@ -16,10 +16,9 @@ import threading
 import time
 import unittest
 
-from running_arm import ROOT, skip_without_multicast
+from running_arm import PATIENCE_S, own_url, skip_without_multicast, start, wait_for, write_config
 
 PROGRAMS = pathlib.Path(sys.argv.pop(1))
-PATIENCE_S = 60
 
 skip_without_multicast()
 
@@ -32,34 +31,23 @@ SOON = ["--seconds", "2", "--pulse", "--hold", "0.45"]
 
 class Arm:
     """A simulated arm with a port of LCM and a folder of its own."""
-    count = 0
 
     def __init__(self, test, base="paper_arm.yaml", more=ARM):
-        Arm.count += 1
         self.test, self.base, self.more = test, base, more
-        self.url = f"udpm://239.255.76.67:{20000 + (32 * os.getpid() + Arm.count) % 12000}?ttl=0"
+        self.url = own_url()
         temporary = tempfile.TemporaryDirectory()
         test.addClassCleanup(temporary.cleanup)
         self.folder = pathlib.Path(temporary.name)
 
     def config(self, name, more=None, daemon=""):
         """An experiment on this arm's port; `more` stands in place of the arm's own keys."""
-        path = self.folder / f"{name}.yaml"
-        path.write_text(f"include: {ROOT}/config/{self.base}\nname: {name}\n{self.more if more is None else more}"
-                        f"daemon:\n  lcm: {{url: \"{self.url}\", command_validity_s: 0.3}}\n  safety: {{{SAFETY}}}\n{daemon}", encoding="utf-8")
-        return path
+        return write_config(self.folder, self.base, self.url, self.more if more is None else more, name,
+                            SAFETY, daemon)
 
     def start(self, said, program, *arguments):
-        """A program that gets SIGTERM in the end; returns once it has said `said`."""
+        """Returns once the program has said `said`."""
+        process = start(self.test, self.folder, PROGRAMS / program, *arguments)
         output = self.folder / f"{program}.txt"
-        with open(output, "w", encoding="utf-8") as file:
-            process = subprocess.Popen([PROGRAMS / program, *arguments], stdout=file, stderr=file)
-
-        def end():
-            process.kill()
-            process.wait()
-
-        self.test.addClassCleanup(end)
         wait_for(lambda: said in output.read_text(encoding="utf-8"), f"{program}: {said}")
         return process
 
@@ -76,14 +64,6 @@ class Arm:
         done = subprocess.run([PROGRAMS / "softarm", "check", config, "--live", *arguments], capture_output=True,
                               text=True, timeout=PATIENCE_S, check=False)
         return done.returncode, done.stdout, done.stderr
-
-
-def wait_for(reached, what):
-    end = time.monotonic() + PATIENCE_S
-    while not reached():
-        if time.monotonic() > end:
-            raise TimeoutError(what)
-        time.sleep(0.01)
 
 
 SCENES = {}
@@ -202,7 +182,8 @@ def tubes(test):
 
 class Preflight(unittest.TestCase):
     @classmethod
-    def setUpClass(cls):
+    def play(cls):
+        """Every scene in a thread, from now on."""
         cls.told = {}
 
         def play(name, body):
@@ -211,10 +192,13 @@ class Preflight(unittest.TestCase):
             except Exception as error:  # pylint: disable=broad-except
                 cls.told[name] = error
 
-        threads = [threading.Thread(target=play, args=each) for each in SCENES.items()]
-        for thread in threads:
+        cls.threads = [threading.Thread(target=play, args=each) for each in SCENES.items()]
+        for thread in cls.threads:
             thread.start()
-        for thread in threads:
+
+    @classmethod
+    def setUpClass(cls):
+        for thread in cls.threads:
             thread.join()
 
     def expect(self, name, check, text, others_pass=True):
@@ -354,4 +338,5 @@ class Jog(unittest.TestCase):
 
 
 if __name__ == "__main__":
+    Preflight.play()  # while keys are held; those tests come first
     unittest.main()

@@ -13,7 +13,6 @@
 namespace softarm {
 namespace {
 
-using namespace std::chrono_literals;
 using test::FaultTest;
 using test::Station;
 
@@ -32,7 +31,7 @@ TEST_P(MessagesAndLimits, HostileBytesAndAFloodAreCountedAndHarmless) {
   const auto plant = start_plant(*this);
   const auto daemon = start("softarmd");
   const auto deadman = start("softarm", {"deadman"});
-
+  arm_when_asked();
   ASSERT_TRUE(wait_for([&] { return under_pressure(); })) << told() << daemon->printed();
 
   const LcmSettings lcm = load_experiment(config_.string()).transport.lcm;
@@ -42,7 +41,7 @@ TEST_P(MessagesAndLimits, HostileBytesAndAFloodAreCountedAndHarmless) {
   const std::int64_t start_ns = monotonic_now_ns();
   for (int round = 0; round < 20; ++round) {
     for (const Packet& packet : hostile) sender.send(packet);
-    wait_for([] { return false; }, 0.02);  // slowly enough for the real frames to come through
+    go_on(0.02);  // slowly enough for the real frames to come through
   }
   EXPECT_TRUE(wait_for([&] { return status_.messages_malformed > before + 200; })) << told();
   EXPECT_TRUE(stays_active(*this)) << told() << daemon->printed();
@@ -64,16 +63,10 @@ TEST_P(MessagesAndLimits, HostileBytesAndAFloodAreCountedAndHarmless) {
       << told();
   stop = true;
   flood.join();
-  EXPECT_TRUE(wait_for([&, asked = 0]() mutable {
-    if (mode() != Mode::active && ++asked % 10 == 0)
-      client_->send(mode() == Mode::fault ? OperatorRequest::disarm : OperatorRequest::arm);
-    return under_pressure();
-  })) << told()
-      << daemon->printed();
+  EXPECT_TRUE(wait_for([&] { return under_pressure(); })) << told() << daemon->printed();
   EXPECT_TRUE(stays_active(*this)) << told() << daemon->printed();
   expect_limits(*this);
-  daemon->signal(SIGTERM);
-  EXPECT_EQ(daemon->wait(1000ms), 0) << daemon->printed();
+  EXPECT_EQ(end(*daemon), 0) << daemon->printed();
 }
 
 TEST_P(MessagesAndLimits, ReferencesOutOfReachAndThroughTheStraightPoseStayBounded) {
@@ -102,6 +95,7 @@ TEST_P(MessagesAndLimits, ReferencesOutOfReachAndThroughTheStraightPoseStayBound
     Station& station = *stations[k];
     configure(station, "", "", settings[k]);
     if (k > 0) station.listen();
+    if (k < 2) station.arm_when_asked();
     processes.push_back(start_plant(station));
     processes.push_back(station.start("softarmd"));
   }
@@ -128,13 +122,8 @@ TEST_P(MessagesAndLimits, TheSingularPoseOfTheCouplesStaysBounded) {
             "      - {time_s: 4, theta_rad: 0}\n");
   const auto plant = start_plant(*this);
   const auto daemon = start("softarmd");
-  const auto bounded = [&, asked = 0]() mutable {
-    // A busy machine may drive the arm beyond its soft limit first.
-    if (reason() == Reason::waiting_for_arm && ++asked % 10 == 0)
-      client_->send(OperatorRequest::arm);
-    return saw_bounded_;
-  };
-  EXPECT_TRUE(wait_for(bounded, 30.0)) << told() << daemon->printed();
+  arm_when_asked();
+  EXPECT_TRUE(wait_for([&] { return saw_bounded_; })) << told() << daemon->printed();
   const int commands = commands_;
   EXPECT_TRUE(wait_for([&] { return commands_ > commands + 200; })) << daemon->printed();
   expect_limits(*this);

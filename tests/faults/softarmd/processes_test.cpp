@@ -34,6 +34,7 @@ TEST_P(ProcessFaults, SignalsEndItVentedAndAKilledOneLeavesTheArmVented) {
   for (Each& each : all) {
     configure(each.station);
     if (&each.station != this) each.station.listen();
+    each.station.arm_when_asked();
     each.plant = start_plant(each.station);
     each.daemon = each.station.start("softarmd");
   }
@@ -42,10 +43,11 @@ TEST_P(ProcessFaults, SignalsEndItVentedAndAKilledOneLeavesTheArmVented) {
     Station& station = each.station;
     ASSERT_TRUE(station.wait_for([&] { return station.under_pressure(); }))
         << each.daemon->printed() << each.plant->printed();
-    each.daemon->signal(each.signal);
-    const bool is_kill = each.signal == SIGKILL;
-    EXPECT_EQ(each.daemon->wait(1000ms), is_kill ? 128 + SIGKILL : 0) << each.daemon->printed();
     station.forget();
+    const bool is_kill = each.signal == SIGKILL;
+    EXPECT_EQ(station.end(*each.daemon, each.signal), is_kill ? 128 + SIGKILL : 0)
+        << each.daemon->printed();
+    EXPECT_LT(station.shutdown_statuses_, 500) << "a second of its ticks";
     ASSERT_TRUE(station.wait_for([&] {
       return station.plant_.vented && station.largest(station.plant_.pressure_bar) < 1e-3F;
     })) << each.plant->printed();
@@ -63,6 +65,7 @@ TEST_P(ProcessFaults, AStoppedDaemonThrowsItsQueueAwayAndVents) {
   // The valves' read-back queues up as well; that it was not heard is no silence of theirs.
   configure(*this, ", valve_readback: true");
   const auto plant = start_plant(*this);
+  arm_when_asked();
   // Neither its own messages nor a logger beside it can be written: the disk is full.
   Process daemon("softarmd", {config_.string()}, "/dev/full");
   Process logger("/lcm-logger", {"--lcm-url=" + url_, "--force", "/dev/full"}, "/dev/null");
@@ -71,7 +74,7 @@ TEST_P(ProcessFaults, AStoppedDaemonThrowsItsQueueAwayAndVents) {
   forget();
   daemon.signal(SIGSTOP);
   ASSERT_TRUE(wait_for([&] { return plant_.vented; })) << "expired commands vent";
-  wait_for([] { return false; }, 0.3);  // longer than vent_after_s
+  go_on(0.3);  // longer than vent_after_s
   daemon.signal(SIGCONT);
   EXPECT_TRUE(wait_for([&] { return saw(Mode::vent, Reason::time_gap); })) << told();
   EXPECT_FALSE(saw(Mode::fault, Reason::valves_silent)) << told();
@@ -79,12 +82,11 @@ TEST_P(ProcessFaults, AStoppedDaemonThrowsItsQueueAwayAndVents) {
 
   // Meanwhile nobody else may serve the same channel: another one ends before it publishes.
   const auto second = start("softarmd");
-  EXPECT_EQ(second->wait(5000ms), 75);
+  EXPECT_EQ(end_of(*second), 75);
   EXPECT_NE(second->printed().find("another instance"), std::string::npos) << second->printed();
   EXPECT_TRUE(stays_active(*this)) << told();
 
-  daemon.signal(SIGTERM);
-  EXPECT_EQ(daemon.wait(1000ms), 0);
+  EXPECT_EQ(end(daemon), 0);
   EXPECT_TRUE(wait_for([&] { return plant_.vented; }));
   expect_limits(*this);
 }
@@ -102,6 +104,8 @@ TEST_P(ProcessFaults, MissedTicksAreCountedAndUnderFifoHoldThenVent) {
   const auto other_plant = start_plant(without);
   const auto daemon = start("softarmd");
   const auto other = without.start("softarmd");
+  arm_when_asked();
+  without.arm_when_asked();
   ASSERT_TRUE(wait_for([&] { return mode() == Mode::active; })) << daemon->printed();
   ASSERT_TRUE(without.wait_for([&] { return without.mode() == Mode::active; })) << other->printed();
 
@@ -167,7 +171,7 @@ TEST(BadConfiguration, IsRefusedAndNothingPublished) {
   for (std::size_t k = 0; k < std::size(rows); ++k) {
     const Row& row = rows[k];
     SCOPED_TRACE(std::string(row.daemon) + row.rest);
-    EXPECT_EQ(daemons[k]->wait(10s), 78);
+    EXPECT_EQ(stations[k]->end_of(*daemons[k]), 78);
     const std::string printed = daemons[k]->printed();
     for (const std::string& part :
          {std::string("config.yaml") + row.line, std::string(row.key), std::string(row.expected)})

@@ -12,6 +12,7 @@
 #include "softarm/recording/logged_run.hpp"
 #include "softarm/transport/lcm_node.hpp"
 #include "softarm/transport/message_decoding.hpp"
+#include "test_folder.hpp"
 
 namespace softarm {
 namespace {
@@ -31,13 +32,6 @@ class Recordings : public ::testing::Test {
  protected:
   void SetUp() override {
     if (!std::filesystem::exists(kData)) GTEST_SKIP() << "the recordings are not here: " << kData;
-    folder_ = std::filesystem::temp_directory_path() /
-              ("softarm_" + std::to_string(getpid()) + "_" +
-               ::testing::UnitTest::GetInstance()->current_test_info()->name());
-    std::filesystem::create_directories(folder_);
-  }
-  void TearDown() override {
-    if (!folder_.empty()) std::filesystem::remove_all(folder_);
   }
 
   std::filesystem::path import(const char* table, const char* map) {
@@ -49,7 +43,7 @@ class Recordings : public ::testing::Test {
     return log;
   }
 
-  std::filesystem::path folder_;
+  TestFolder folder_;
 };
 
 /// When each new frame arrived, read without our code: times of the log's events whose frame number

@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "program_output.hpp"
+#include "test_folder.hpp"
 #include "unit/recording/recorded_log.hpp"
 
 namespace softarm {
@@ -19,20 +20,14 @@ const std::string kConfig = SOFTARM_SOURCE_DIR "/config/paper_arm.yaml";
 
 class Report : public ::testing::Test {
  protected:
-  void SetUp() override {
-    folder_ = fs::temp_directory_path() / ("softarm_report_" + std::to_string(getpid()));
-    fs::create_directories(folder_);
-  }
-  void TearDown() override { fs::remove_all(folder_); }
-
   Outcome report(const std::string& bytes, const std::string& config = kConfig) {
-    std::ofstream(folder_ / "log", std::ios::binary) << bytes;
+    folder_.write("log", bytes);
     return test::run("report --no-plots --out '" + (folder_ / "out").string() + "' '" +
                      (folder_ / "log").string() + "' '" + config + "'");
   }
   /// Second column of log.csv.
   std::vector<std::string> logged_modes() const {
-    std::ifstream file(folder_ / "out" / "log.csv");
+    std::ifstream file(folder_ / "out/log.csv");
     std::vector<std::string> modes;
     for (std::string line; std::getline(file, line);) {
       if (line.empty() || line[0] == '#' || line[0] == 't') continue;
@@ -42,7 +37,7 @@ class Report : public ::testing::Test {
     return modes;
   }
 
-  fs::path folder_;
+  TestFolder folder_;
 };
 
 TEST_F(Report, HasARowForEveryStatusOfALogWithFaultsInIt) {

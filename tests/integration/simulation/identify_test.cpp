@@ -10,6 +10,7 @@
 #include "softarm/commissioning/identification/coverage.hpp"
 #include "softarm/commissioning/identification/linear_fit.hpp"
 #include "softarm/config/load.hpp"
+#include "test_folder.hpp"
 
 namespace softarm {
 namespace {
@@ -107,8 +108,7 @@ TEST(Identify, RecoversThePapersArmWithinTwoPercent) {
 }
 
 TEST(Identify, WritesAnExperimentWhosePlantIsUnchanged) {
-  std::string pattern = (fs::temp_directory_path() / "softarm_identify_XXXXXX").string();
-  const fs::path folder = mkdtemp(pattern.data());
+  const TestFolder folder;
   const fs::path config = kConfig / "paper_arm_mismatch.yaml", output = folder / "identified.yaml";
   test::Process process(
       "softarm",
@@ -129,7 +129,6 @@ TEST(Identify, WritesAnExperimentWhosePlantIsUnchanged) {
       EXPECT_NEAR(before.plant.actuation.segments[i][j].gain_nm_per_bar,
                   after.plant.actuation.segments[i][j].gain_nm_per_bar, 1e-5);
   }
-  fs::remove_all(folder);
 }
 
 }  // namespace
