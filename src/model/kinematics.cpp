@@ -18,7 +18,7 @@ struct TipMotion {
   Eigen::Vector3d rate = Eigen::Vector3d::Zero();
 };
 
-/// Walks from base to tip and tells `visit` every segment's columns, in the world: visit(i, R,
+/// Walks from base to tip and gives `visit` every segment's columns, in the world: visit(i, R,
 /// spin, curve and spin of i).
 struct Walk {
   Eigen::Matrix3d R;                                 ///< S_{i-1} in the world

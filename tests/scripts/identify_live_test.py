@@ -40,7 +40,7 @@ def commands(log):
 
 
 def mark(log, url, word):
-    """Sends a message of one word until the logger has written it: it hears, and has written what came before."""
+    """Sends a message of one word until the logger has written it: it receives, and has written what came before."""
     group, port = re.match(r"udpm://([\d.]+):(\d+)", url).groups()
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
         sender.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, 0)
@@ -69,13 +69,13 @@ class IdentifyLive(unittest.TestCase):
         logger = subprocess.Popen(["lcm-logger", "--quiet", "--lcm-url", url, "--channel", "SOFTARM_PRESSURE_COMMAND|MARK", log],
                                   stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         mark(log, url, b"before")
-        told = self.folder / "told.txt"
-        with open(told, "w", encoding="utf-8") as file:
+        output = self.folder / "printed.txt"
+        with open(output, "w", encoding="utf-8") as file:
             identify = subprocess.Popen([PROGRAMS / "softarm", "identify", config, "--live", "--output", written], stdout=file,
                                         stderr=file)
             try:
                 if meanwhile:
-                    wait_for(lambda: "step 1 of" in told.read_text(encoding="utf-8"), "the first step")
+                    wait_for(lambda: "step 1 of" in output.read_text(encoding="utf-8"), "the first step")
                     time.sleep(0.3)  # for three times as long as the step rises
                     meanwhile(identify, plant)
                 code = identify.wait(timeout=PATIENCE_S)
@@ -89,22 +89,22 @@ class IdentifyLive(unittest.TestCase):
                     plant.kill()
                     plant.wait()
         self.assertFalse(written.exists())
-        return code, told.read_text(encoding="utf-8"), commands(log)
+        return code, output.read_text(encoding="utf-8"), commands(log)
 
     def expect_vented(self, why, limits, meanwhile=None):
         for _ in range(5):
-            code, told, sent = self.play(limits, meanwhile)
-            if BUSY not in told:
+            code, printed, sent = self.play(limits, meanwhile)
+            if BUSY not in printed:
                 break
-        self.assertEqual(code, 1, told)
-        self.assertRegex(told, "vented, nothing identified: " + why)
+        self.assertEqual(code, 1, printed)
+        self.assertRegex(printed, "vented, nothing identified: " + why)
         pushed = [k for k, (_, bar) in enumerate(sent) if any(bar)]
-        self.assertTrue(pushed, told)
+        self.assertTrue(pushed, printed)
         self.assertLess(max(max(bar) for _, bar in sent), 0.4 + 1e-6)
         for (before_s, before), (now_s, bar) in zip(sent, sent[1:]):
             self.assertLess(max(b - a for a, b in zip(before, bar)), SLEW_BAR_PER_S * (now_s - before_s) + 0.005)
         after = [time_s for time_s, _ in sent[pushed[-1] + 1:]]
-        self.assertGreater(after[-1] - after[0], 0.9)  # zero for a second, as the page says
+        self.assertGreater(after[-1] - after[0], 0.9)  # zero for a second, as documented
 
     def test_a_bend_beyond_the_limit_vents(self):
         self.expect_vented(r"a segment bends by 0\.\d+ rad, beyond identification\.max_theta_rad of 0\.05 rad",
@@ -118,17 +118,17 @@ class IdentifyLive(unittest.TestCase):
         self.expect_vented("stopped", "max_theta_rad: 3", lambda identify, _: identify.send_signal(signal.SIGINT))
 
     def test_an_arm_that_is_not_seen_any_more_is_vented(self):
-        code, told, sent = self.play("max_theta_rad: 3", lambda _, plant: plant.send_signal(signal.SIGSTOP))
-        self.assertEqual(code, 1, told)
-        self.assertIn("vented, nothing identified: no frame with every segment for 200 ms", told)
+        code, printed, sent = self.play("max_theta_rad: 3", lambda _, plant: plant.send_signal(signal.SIGSTOP))
+        self.assertEqual(code, 1, printed)
+        self.assertIn("vented, nothing identified: no frame with every segment for 200 ms", printed)
         self.assertFalse(any(sent[-1][1]))
         self.assertTrue(any(any(bar) for _, bar in sent))
 
     def test_without_frames_nothing_is_inflated(self):
-        code, told, sent = self.play("max_theta_rad: 3", arm=False)
-        self.assertEqual(code, 1, told)
-        self.assertIn("no frame with every segment on", told)
-        self.assertIn("is motion capture running", told)
+        code, printed, sent = self.play("max_theta_rad: 3", arm=False)
+        self.assertEqual(code, 1, printed)
+        self.assertIn("no frame with every segment on", printed)
+        self.assertIn("is motion capture running", printed)
         self.assertTrue(sent)
         self.assertFalse(any(any(bar) for _, bar in sent))
 

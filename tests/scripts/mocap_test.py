@@ -1,4 +1,4 @@
-"""The daemon follows frames that a client nobody here wrote publishes: the Python package lcm. Argument: folder of the programs.
+"""The daemon follows frames that an independent client publishes: the Python package lcm. Argument: folder of the programs.
 
 Runs in the Python of tools/python_environment; skipped where that was not made.
 """
@@ -20,7 +20,7 @@ import lcm  # noqa: E402
 from softarm_messages import controller_status_t, optitrack_frame_t  # noqa: E402
 
 PROGRAMS = pathlib.Path(sys.argv.pop(1))
-# It is 1.4 mrad with the frames of config/paper_arm.yaml; 4 mm between plate and axis unknown to the daemon are more than this.
+# It is 1.4 mrad with the frames of config/paper_arm.yaml; 4 mm between marker frame and axis unknown to the daemon are more than this.
 BOUND_RAD = 0.01
 
 

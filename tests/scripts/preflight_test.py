@@ -1,6 +1,6 @@
 """softarm check --live and softarm jog against running arms, each wrong by one thing. Argument: folder of the programs.
 
-All arms run at once, and each check on a port of its own: together they take as long as the longest, and keys are held meanwhile.
+All arms run at once, and each check on a separate port: together they take as long as the longest, and keys are held meanwhile.
 """
 import json
 import os
@@ -30,7 +30,7 @@ SOON = ["--seconds", "2", "--pulse", "--hold", "0.45"]
 
 
 class Arm:
-    """A simulated arm with a port of LCM and a folder of its own."""
+    """A simulated arm with its own LCM port and folder."""
 
     def __init__(self, test, base="paper_arm.yaml", more=ARM):
         self.test, self.base, self.more = test, base, more
@@ -54,7 +54,7 @@ class Arm:
     def plant(self, *arguments, daemon=""):
         return self.start("motion capture at", "softarm-plant", *arguments, self.config("plant", daemon=daemon))
 
-    def spoilt_plant(self, fault, *arguments):
+    def faulty_plant(self, fault, *arguments):
         """With softarm-dev fault between its sensors and us."""
         self.plant("--sensor-suffix", "_CLEAN")
         self.start("", "softarm-dev", "fault", self.config("relay"), fault, "--after", "0", "--for", "100", *arguments)
@@ -89,8 +89,8 @@ def swapped_chambers(test):
 
 
 @scene
-def beliefs(test):
-    """One arm, looked at with beliefs that are wrong by one thing each."""
+def wrong_settings(test):
+    """One arm, checked against configurations with one wrong setting each."""
     arm = Arm(test, more="arm: {segments: 3}\n" + CAMERA)
     arm.plant()
     wrong = {
@@ -155,14 +155,14 @@ def vicon(test):
 @scene
 def mirror(test):
     arm = Arm(test)
-    arm.spoilt_plant("mirror")
+    arm.faulty_plant("mirror")
     return arm.check(arm.config("lab"), *SOON)
 
 
 @scene
 def leak(test):
     arm = Arm(test)
-    arm.spoilt_plant("leak", "--body", "5")
+    arm.faulty_plant("leak", "--body", "5")
     return arm.check(arm.config("lab"), *SOON)
 
 
@@ -184,13 +184,13 @@ class Preflight(unittest.TestCase):
     @classmethod
     def play(cls):
         """Every scene in a thread, from now on."""
-        cls.told = {}
+        cls.outcomes = {}
 
         def play(name, body):
             try:
-                cls.told[name] = body(cls)
+                cls.outcomes[name] = body(cls)
             except Exception as error:  # pylint: disable=broad-except
-                cls.told[name] = error
+                cls.outcomes[name] = error
 
         cls.threads = [threading.Thread(target=play, args=each) for each in SCENES.items()]
         for thread in cls.threads:
@@ -202,23 +202,23 @@ class Preflight(unittest.TestCase):
             thread.join()
 
     def expect(self, name, check, text, others_pass=True):
-        told = self.told[name]
-        self.assertIsInstance(told, tuple, told)
-        code, report, errors = told
+        outcome = self.outcomes[name]
+        self.assertIsInstance(outcome, tuple, outcome)
+        code, report, errors = outcome
         self.assertEqual(code, 1, report + errors)
         self.assertRegex(report, rf"(?m)^FAIL +{check} .*{text}.*\. Fix: .+", errors)
         if others_pass:
             self.assertEqual(len(re.findall("^FAIL", report, flags=re.MULTILINE)), 1, report)
 
     def test_a_right_arm_passes_everything(self):
-        code, report, errors = self.told["right"]
+        code, report, errors = self.outcomes["right"]
         self.assertEqual(code, 0, report + errors)
         self.assertIn("15 passed, 0 failed, 0 not checked", report)
         self.assertIn("THE ARM MOVES", errors)
 
-    def test_wrong_beliefs(self):
-        told = self.told["beliefs"]
-        self.assertIsInstance(told, dict, told)
+    def test_wrong_settings(self):
+        outcome = self.outcomes["wrong_settings"]
+        self.assertIsInstance(outcome, dict, outcome)
         for name, check, text in (("length", "lengths", r"segment 2 is 0\.1[01]\d* m long, 0\.1300 m configured"),
                                   ("order", "order", "end of segment 2 and end of segment 3 are exchanged"),
                                   ("unseen", "bodies", r"end of segment 3 \(id 7\) never seen"),
@@ -227,7 +227,7 @@ class Preflight(unittest.TestCase):
                                   ("silent", "bodies", "no frame on ELSEWHERE"),
                                   ("up", "world axes", r"along -z .* should be \+z")):
             with self.subTest(name):
-                report, errors, code = told[name]
+                report, errors, code = outcome[name]
                 self.assertEqual(code, 1, report + errors)
                 texts = [each["text"] for each in json.loads(report)["findings"]
                          if each["check"] == check and each["verdict"] == "FAIL"]
@@ -239,15 +239,15 @@ class Preflight(unittest.TestCase):
 
     def test_units(self):
         self.expect("units", "units", "positions come in millimetres")
-        self.assertIn("no chamber was filled", self.told["units"][2])
+        self.assertIn("no chamber was filled", self.outcomes["units"][2])
 
     def test_order_of_the_quaternion(self):
         self.expect("quaternions", "quaternions", "w, x, y, z and x, y, z, w are interchanged")
 
     def test_other_sources(self):
         self.expect("optitrack", "world axes", "should be -z", others_pass=False)
-        self.assertIsInstance(self.told["vicon"], tuple, self.told["vicon"])
-        _, report, errors = self.told["vicon"]
+        self.assertIsInstance(self.outcomes["vicon"], tuple, self.outcomes["vicon"])
+        _, report, errors = self.outcomes["vicon"]
         # Not the whole report: on a busy machine a body's packet may come too late for its frame.
         for check in ("units", "order", "world axes", "lengths", "rest pose"):
             self.assertRegex(report, rf"(?m)^pass +{check} ", errors)
@@ -258,7 +258,7 @@ class Preflight(unittest.TestCase):
     def test_valve_map(self):
         self.expect("swapped_chambers", "valve map", "chamber 1 of segment 1 acts as chamber 2 of segment 1")
         self.expect("tubes", "valve map", "chamber 1 of segment 1 acts as chamber 1 of segment 2")
-        self.assertIn("valves.order: [0, 1, 2, 3, 4, 5, 6, 7]", self.told["tubes"][1])
+        self.assertIn("valves.order: [0, 1, 2, 3, 4, 5, 6, 7]", self.outcomes["tubes"][1])
 
     def test_leak(self):
         self.expect("leak", "leaks", r"chamber 2 of segment 2 reaches 0\.\d+ bar of 0\.\d+ bar")

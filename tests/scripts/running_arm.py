@@ -1,4 +1,4 @@
-"""What the tests of scripts share that look at a running arm: a port of their own, programs that end with the test."""
+"""Shared by the tests of scripts that look at a running arm: a separate port, programs that end with the test."""
 import concurrent.futures
 import itertools
 import json
@@ -31,7 +31,7 @@ def skip_without_our_python():
 
 
 def go_on_in_our_python():
-    """Begins the test anew in the Python that has the package lcm, or skips it."""
+    """Starts the test again in the Python that has the package lcm, or skips it."""
     if pathlib.Path(sys.prefix) != PYTHON.parents[1]:
         skip_without_our_python()
         os.execv(PYTHON, [PYTHON, "-B", *sys.argv])

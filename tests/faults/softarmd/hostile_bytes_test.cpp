@@ -1,5 +1,5 @@
-// Malformed packets by the thousand (slow: by the million) while the arm is under control, and the
-// one packet that no process survives.
+// Thousands of malformed packets (label slow: millions) while the arm is under control, and the one
+// packet that no process survives.
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
@@ -30,7 +30,7 @@ class HostileBytes : public FaultTest {
  protected:
   void arm() {
     arm_when_asked();
-    EXPECT_TRUE(wait_for([&] { return under_pressure(); })) << told();
+    EXPECT_TRUE(wait_for([&] { return under_pressure(); })) << seen_text();
     meanwhile_ = {};
   }
 
@@ -77,7 +77,7 @@ TEST_P(HostileBytes, MalformedPacketsWithoutEndAreRefusedWhileTheArmIsControlled
     if (memory_kb == 0 && sent > packets / 10) memory_kb = resident_kb(daemon->pid());
   }
   const double passed_s = to_seconds(monotonic_now_ns() - start_ns);
-  EXPECT_TRUE(stays_active(*this)) << told() << daemon->printed();
+  EXPECT_TRUE(stays_active(*this)) << seen_text() << daemon->printed();
   const std::int64_t refused = status_.messages_malformed - before;
   const long grown_kb = resident_kb(daemon->pid()) - memory_kb;
   std::cout << packets << " malformed packets in " << passed_s << " s, " << refused
@@ -126,7 +126,7 @@ TEST_P(HostileBytes, TheFragmentThatEndsEverySubscriberLeavesTheArmVentedAndTheR
   if (ended == -1) GTEST_SKIP() << "this LCM survives the fragment";
   EXPECT_NE(ended, 0) << "a supervisor must see a failure";
   EXPECT_GT(valves->wait(60s), 0);
-  EXPECT_EQ(plant->wait(0ms), -1) << "who subscribes to nothing lives";
+  EXPECT_EQ(plant->wait(0ms), -1) << "a process without subscriptions survives";
 
   plant_ = {};
   listen();
@@ -139,9 +139,9 @@ TEST_P(HostileBytes, TheFragmentThatEndsEverySubscriberLeavesTheArmVentedAndTheR
   valves = start("softarm-valves");
   EXPECT_TRUE(wait_for([&] {
     return mode() == Mode::wait_frames && reason() == Reason::waiting_for_arm && statuses_ > 200;
-  })) << told()
+  })) << seen_text()
       << daemon->printed();
-  EXPECT_FALSE(saw(Mode::active, Reason::none)) << "nobody armed it";
+  EXPECT_FALSE(saw(Mode::active, Reason::none)) << "it was not armed";
   EXPECT_GT(commands_, 0);
   EXPECT_EQ(largest(command_.pressure_bar), 0.0F);
   EXPECT_TRUE(arm_is_vented() || largest(plant_.pressure_bar) < 1e-3F);

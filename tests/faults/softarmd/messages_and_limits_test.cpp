@@ -32,7 +32,7 @@ TEST_P(MessagesAndLimits, HostileBytesAndAFloodAreCountedAndHarmless) {
   const auto daemon = start("softarmd");
   const auto deadman = start("softarm", {"deadman"});
   arm_when_asked();
-  ASSERT_TRUE(wait_for([&] { return under_pressure(); })) << told() << daemon->printed();
+  ASSERT_TRUE(wait_for([&] { return under_pressure(); })) << seen_text() << daemon->printed();
 
   const LcmSettings lcm = load_experiment(config_.string()).transport.lcm;
   const std::vector<Packet> hostile = hostile_packets(lcm);
@@ -43,11 +43,12 @@ TEST_P(MessagesAndLimits, HostileBytesAndAFloodAreCountedAndHarmless) {
     for (const Packet& packet : hostile) sender.send(packet);
     go_on(0.02);  // slowly enough for the real frames to come through
   }
-  EXPECT_TRUE(wait_for([&] { return status_.messages_malformed > before + 200; })) << told();
-  EXPECT_TRUE(stays_active(*this)) << told() << daemon->printed();
+  EXPECT_TRUE(wait_for([&] { return status_.messages_malformed > before + 200; })) << seen_text();
+  EXPECT_TRUE(stays_active(*this)) << seen_text() << daemon->printed();
   const double passed_s = to_seconds(monotonic_now_ns() - start_ns);
   EXPECT_TRUE(wait_for([&] { return count(daemon->printed(), "malformed") > 0; }));
-  EXPECT_LE(count(daemon->printed(), "malformed"), 2.0 + passed_s) << "told once a second at most";
+  EXPECT_LE(count(daemon->printed(), "malformed"), 2.0 + passed_s)
+      << "reported at most once a second";
 
   // As fast as it goes: the daemon keeps ticking, and is back when it is over. What it needs to
   // hear may be lost meanwhile, so it may ask for an operator.
@@ -60,11 +61,11 @@ TEST_P(MessagesAndLimits, HostileBytesAndAFloodAreCountedAndHarmless) {
   const std::int64_t tick = status_.tick;
   const int commands = commands_;
   EXPECT_TRUE(wait_for([&] { return status_.tick > tick + 500 && commands_ > commands; }))
-      << told();
+      << seen_text();
   stop = true;
   flood.join();
-  EXPECT_TRUE(wait_for([&] { return under_pressure(); })) << told() << daemon->printed();
-  EXPECT_TRUE(stays_active(*this)) << told() << daemon->printed();
+  EXPECT_TRUE(wait_for([&] { return under_pressure(); })) << seen_text() << daemon->printed();
+  EXPECT_TRUE(stays_active(*this)) << seen_text() << daemon->printed();
   expect_limits(*this);
   EXPECT_EQ(end(*daemon), 0) << daemon->printed();
 }
@@ -99,15 +100,15 @@ TEST_P(MessagesAndLimits, ReferencesOutOfReachAndThroughTheStraightPoseStayBound
     processes.push_back(start_plant(station));
     processes.push_back(station.start("softarmd"));
   }
-  EXPECT_TRUE(wait_for([&] { return saw_bounded_; })) << told() << processes[1]->printed();
+  EXPECT_TRUE(wait_for([&] { return saw_bounded_; })) << seen_text() << processes[1]->printed();
   EXPECT_TRUE(unreachable.wait_for([&] {
     return unreachable.saw_saturated_ && unreachable.saw_slew_limited_;
-  })) << unreachable.told()
+  })) << unreachable.seen_text()
       << processes[3]->printed();
-  EXPECT_TRUE(stays_active(unreachable)) << unreachable.told() << processes[3]->printed();
+  EXPECT_TRUE(stays_active(unreachable)) << unreachable.seen_text() << processes[3]->printed();
   EXPECT_TRUE(beyond.wait_for([&] { return beyond.saw(Mode::vent, Reason::soft_limit); }))
-      << beyond.told() << processes[5]->printed();
-  EXPECT_TRUE(becomes(beyond, Mode::vent, Reason::waiting_for_arm)) << beyond.told();
+      << beyond.seen_text() << processes[5]->printed();
+  EXPECT_TRUE(becomes(beyond, Mode::vent, Reason::waiting_for_arm)) << beyond.seen_text();
   for (const Station* station : stations) expect_limits(*station);
 }
 
@@ -123,7 +124,7 @@ TEST_P(MessagesAndLimits, TheSingularPoseOfTheCouplesStaysBounded) {
   const auto plant = start_plant(*this);
   const auto daemon = start("softarmd");
   arm_when_asked();
-  EXPECT_TRUE(wait_for([&] { return saw_bounded_; })) << told() << daemon->printed();
+  EXPECT_TRUE(wait_for([&] { return saw_bounded_; })) << seen_text() << daemon->printed();
   const int commands = commands_;
   EXPECT_TRUE(wait_for([&] { return commands_ > commands + 200; })) << daemon->printed();
   expect_limits(*this);

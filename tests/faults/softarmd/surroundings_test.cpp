@@ -1,4 +1,5 @@
-// What happens around the daemon: its machine's wall clock is set, somebody leans on the arm.
+// Disturbances from outside: the wall clock of the daemon's machine is set, a person leans on the
+// arm.
 #include <fcntl.h>
 #include <sys/mman.h>
 #include <unistd.h>
@@ -60,17 +61,17 @@ TEST_P(Surroundings, AWallClockThatIsSetDisturbsNothing) {
   arguments.push_back(std::string(SOFTARM_BINARY_DIR) + "/bin/softarmd");
   const auto daemon = start("/env", arguments);
   arm_when_asked();
-  ASSERT_TRUE(wait_for([&] { return under_pressure(); })) << told() << daemon->printed();
+  ASSERT_TRUE(wait_for([&] { return under_pressure(); })) << seen_text() << daemon->printed();
   for (const std::int64_t offset_s : {3600, -86400, -86397, 0}) {
     SCOPED_TRACE(offset_s);
     forget();
     clock.set_offset_s(offset_s);
     const std::int64_t reads = clock.reads();
     const std::int64_t accepted = status_.frames_accepted;
-    EXPECT_TRUE(wait_for([&] { return status_.frames_accepted > accepted + 40; })) << told();
+    EXPECT_TRUE(wait_for([&] { return status_.frames_accepted > accepted + 40; })) << seen_text();
     EXPECT_GT(clock.reads(), reads) << "arrivals are stamped with the wall clock";
-    EXPECT_EQ(seen_.size(), 1u) << told() << daemon->printed();
-    EXPECT_TRUE(saw(Mode::active, Reason::none)) << told() << daemon->printed();
+    EXPECT_EQ(seen_.size(), 1u) << seen_text() << daemon->printed();
+    EXPECT_TRUE(saw(Mode::active, Reason::none)) << seen_text() << daemon->printed();
   }
   expect_limits(*this);
 }
@@ -86,16 +87,16 @@ TEST_P(Surroundings, CurvatureThatDoesNotFollowIsALatchedFault) {
   const auto other_plant = start_plant(leant_on);
   const auto other = leant_on.start("softarmd");
   EXPECT_TRUE(leant_on.wait_for([&] { return leant_on.mode() == Mode::fault; }))
-      << leant_on.told() << other->printed();
-  EXPECT_EQ(leant_on.reason(), Reason::curvature_mismatch) << leant_on.told();
+      << leant_on.seen_text() << other->printed();
+  EXPECT_EQ(leant_on.reason(), Reason::curvature_mismatch) << leant_on.seen_text();
   EXPECT_TRUE(leant_on.wait_for([&] { return largest(leant_on.command_.pressure_bar) == 0.0F; }));
   const std::int64_t tick = leant_on.status_.tick;
   ASSERT_TRUE(leant_on.wait_for([&] { return leant_on.status_.tick > tick + 200; }));
   EXPECT_EQ(leant_on.mode(), Mode::fault) << "it is latched";
-  // The same watch, and nobody leans on the arm.
-  EXPECT_TRUE(wait_for([&] { return under_pressure(); })) << told() << daemon->printed();
-  EXPECT_TRUE(stays_active(*this)) << told() << daemon->printed();
-  EXPECT_FALSE(saw(Mode::fault, Reason::curvature_mismatch)) << told();
+  // The same check, without a person who leans on the arm.
+  EXPECT_TRUE(wait_for([&] { return under_pressure(); })) << seen_text() << daemon->printed();
+  EXPECT_TRUE(stays_active(*this)) << seen_text() << daemon->printed();
+  EXPECT_FALSE(saw(Mode::fault, Reason::curvature_mismatch)) << seen_text();
   expect_limits(*this);
   expect_limits(leant_on);
 }

@@ -42,7 +42,7 @@ std::vector<Event<Message>> read_log(const std::string& file, const std::string&
   return events;
 }
 
-/// A folder of its own, gone afterwards.
+/// A separate folder, removed afterwards.
 class ImportTest : public testing::Test {
  protected:
   std::string path(const std::string& name) const { return (folder / name).string(); }

@@ -1,5 +1,5 @@
-// softarmd and softarm-plant as processes of their own, talking LCM over UDP multicast on a port of
-// the test's own. What happens when something goes wrong is in tests/faults.
+// softarmd and softarm-plant as separate processes, connected by LCM over UDP multicast on a port
+// of the test. What happens when something goes wrong is in tests/faults.
 #include <gtest/gtest.h>
 
 #include <cmath>

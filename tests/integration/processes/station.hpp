@@ -1,4 +1,4 @@
-// A daemon, its plant and all they say: a configuration and a network port of their own, processes
+// A daemon, its plant and all that they send: a separate configuration and network port, processes
 // that end with the test, and what came over the wire.
 #pragma once
 
@@ -17,6 +17,7 @@
 
 #include "dev/soak/command_steps.hpp"
 #include "integration/processes/process.hpp"
+#include "own_url.hpp"
 #include "softarm/base/time.hpp"
 #include "softarm/client/arm_client.hpp"
 #include "softarm/config/load.hpp"
@@ -28,16 +29,10 @@ inline constexpr std::int64_t kSecond = 1'000'000'000;
 
 class Station {
  public:
-  Station() {
-    static int stations = 0;
-    const int number = stations++;
-    // A port of its own, so that tests may run side by side.
-    url_ = "udpm://239.255.76.67:" + std::to_string(20000 + (8 * getpid() + number) % 12000) +
-           "?ttl=0";
-    write_config("paper_arm.yaml", std::string("  safety: {") + kPatientSafety + "}\n");
-  }
+  Station() { write_config("paper_arm.yaml", std::string("  safety: {") + kPatientSafety + "}\n"); }
 
-  /// Begins to listen to an arm with as many segments as that of config/BASE. @throws TransportError
+  /// Begins to listen to an arm with as many segments as that of config/BASE.
+  /// @throws TransportError
   void listen(const std::string& base = "paper_arm.yaml") {
     Experiment arm = load_experiment(SOFTARM_SOURCE_DIR "/config/" + base);
     arm.transport.lcm.url = url_;
@@ -140,7 +135,7 @@ class Station {
   Mode mode() const { return statuses_ > 0 ? status_.mode : Mode::init; }
   Reason reason() const { return status_.reason; }
   /// "VENT (frames_stale)", of now and of all that was seen.
-  std::string told() const {
+  std::string seen_text() const {
     std::string text = status_.text() + ", seen:";
     for (const auto& [m, r] : seen_) text += std::string(" ") + name(m) + "(" + name(r) + ")";
     return text;
@@ -162,7 +157,7 @@ class Station {
 
   TestFolder folder_;
   std::filesystem::path config_;
-  std::string url_;
+  std::string url_ = own_url();
   std::string lcm_;          ///< more keys of daemon.lcm, each with a comma before it
   double validity_s_ = 0.3;  ///< of a command; longer than a busy machine delays one
   std::unique_ptr<ArmClient> client_;

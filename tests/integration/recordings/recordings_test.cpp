@@ -7,6 +7,7 @@
 #include <lcm/lcm-cpp.hpp>
 
 #include "integration/processes/process.hpp"
+#include "own_url.hpp"
 #include "softarm/client/arm_client.hpp"
 #include "softarm/config/load.hpp"
 #include "softarm/recording/logged_run.hpp"
@@ -167,7 +168,7 @@ TEST_F(Recordings, SineNeverHolds) {
 }
 
 TEST_F(Recordings, SineJudgedAsAHundredHertzStreamHoldsAndVentsAtItsGaps) {
-  // The same log told to be a 100 Hz stream: every gap beyond 30 ms is one too many, those beyond
+  // The same log declared as a 100 Hz stream: every gap beyond 30 ms is one too many, those beyond
   // 100 ms vent.
   const auto log = import("one_column_sine.csv", "sine_map.yaml");
   Experiment experiment = load_experiment(kSource / "config" / "recorded_sine.yaml");
@@ -194,8 +195,7 @@ TEST_F(Recordings, SineJudgedAsAHundredHertzStreamHoldsAndVentsAtItsGaps) {
 
 TEST_F(Recordings, PlayedIntoAShadowDaemonTheyGoThroughThePipeline) {
   const auto log = import("four_columns_circle.csv", "circle_map.yaml");
-  const std::string url =
-      "udpm://239.255.76.67:" + std::to_string(20000 + getpid() % 12000) + "?ttl=0";
+  const std::string url = test::own_url();
   const auto config = folder_ / "config.yaml";
   std::ofstream(config) << "include: " << kSource / "config" / "recorded_circle.yaml"
                         << "\ndaemon:\n  lcm: {url: \"" << url << "\"}\n";

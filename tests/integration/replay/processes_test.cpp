@@ -47,7 +47,7 @@ class ReplayOfProcesses : public ::testing::Test, protected Station {
   void record(double seconds) {
     const auto logger = start_logger();
     auto plant = start("softarm-plant");
-    // The logger hears: now nothing of the daemon can escape it.
+    // The logger receives: now it misses nothing of the daemon.
     ASSERT_TRUE(wait_for([&] {
       std::error_code error;
       return std::filesystem::file_size(log_, error) > 1000 && !error;
@@ -81,8 +81,8 @@ class ReplayOfProcesses : public ::testing::Test, protected Station {
     ASSERT_NE(end(*logger), -1);
   }
 
-  /// Frames of a sender of our own among the plant's: a body not seen, numbers that are none, and
-  /// numbers that jump.
+  /// Frames of a second sender among the plant's: a body not seen, NaN, and frame numbers that
+  /// jump.
   void occlude() {
     softarm_messages::mocap_frame_t frame{};
     frame.num_bodies = 4;
@@ -137,10 +137,10 @@ class ReplayOfProcesses : public ::testing::Test, protected Station {
   int rounds_ = 0;
 };
 
-TEST_F(ReplayOfProcesses, RecordedWithFaultsIsBitExactAndDamageIsTold) {
+TEST_F(ReplayOfProcesses, RecordedWithFaultsIsBitExactAndDamageIsReported) {
   ASSERT_NO_FATAL_FAILURE(record(seconds_asked()));
   const auto size = std::filesystem::file_size(log_);
-  EXPECT_GT(status_.frames_rejected, 10 * rounds_) << "frames not to be believed were among them";
+  EXPECT_GT(status_.frames_rejected, 10 * rounds_) << "frames to reject were among them";
   EXPECT_GT(statuses_of_[static_cast<std::size_t>(Mode::vent)], 10 * rounds_);
   EXPECT_EQ(replay(), 0) << printed_ << daemon_printed_;
   std::printf("%d rounds of faults, log of %.1f MB\n%s", rounds_, 1e-6 * static_cast<double>(size),
@@ -198,7 +198,7 @@ TEST_F(ReplayOfProcesses, PlayedByLcmLogplayerTheFramesMakeAFreshDaemonActive) {
   const auto player =
       start_as_is("/lcm-logplayer", {"--lcm-url=" + url_, "-e", "SOFTARM_MOCAP", log_});
   EXPECT_TRUE(reach(Mode::active)) << daemon->printed() << player->printed();
-  EXPECT_TRUE(wait_for([&] { return status_.frames_accepted > 100; })) << told();
+  EXPECT_TRUE(wait_for([&] { return status_.frames_accepted > 100; })) << seen_text();
 }
 
 }  // namespace

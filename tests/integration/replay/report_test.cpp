@@ -65,7 +65,7 @@ TEST_F(Report, StepsOverDamageAndSaysWhere) {
   EXPECT_GE(logged_modes().size(), run.modes.size() - 2);
 }
 
-// A time that is damaged is none: nothing overflows, and the run is no longer for it.
+// A damaged time is left out: nothing overflows, and the run is not longer because of it.
 TEST_F(Report, LeavesOutAStatusOfAnImpossibleTime) {
   test::LogBytes log;
   const test::RecordedRun run = test::record_run(load_experiment(kConfig), 1.0, false, log);
@@ -86,7 +86,7 @@ TEST_F(Report, SaysWhatALogLacks) {
   const Outcome empty = report("");
   EXPECT_EQ(empty.code, 65);
   EXPECT_NE(empty.text.find("status_channel"), std::string::npos) << empty.text;
-  // Of another arm nothing is told.
+  // Of another arm nothing is reported.
   test::LogBytes log;
   test::record_run(load_experiment(kConfig), 0.5, false, log);
   EXPECT_EQ(report(log.bytes, SOFTARM_SOURCE_DIR "/config/one_segment.yaml").code, 65);

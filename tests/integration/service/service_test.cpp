@@ -25,12 +25,12 @@ class Service : public ::testing::TestWithParam<AddressKind>, protected test::St
     setenv("WATCHDOG_USEC", std::to_string(1000 * kWatchdog_ms).c_str(), 1);
   }
 
-  /// Reads on until the manager is told this; what came later stays to be read.
+  /// Reads on until the manager received this; what came later stays to be read.
   bool hears(const std::string& text) {
     const auto reads_it = [&] {
-      for (std::string told = manager_.next(); !told.empty(); told = manager_.next()) {
-        heard_ += told;
-        if (told.find(text) != std::string::npos) return true;
+      for (std::string message = manager_.next(); !message.empty(); message = manager_.next()) {
+        heard_ += message;
+        if (message.find(text) != std::string::npos) return true;
       }
       return false;
     };
@@ -68,7 +68,7 @@ TEST_P(Service, HearsOfReadinessModesHealthAndStop) {
   EXPECT_FALSE(heard_.find("STOPPING=1") < heard_.find("STATUS=ACTIVE"));
 }
 
-TEST_P(Service, IsNotToldOfHealthThatItDidNotAskThisProcessFor) {
+TEST_P(Service, GetsNoHealthReportThatItDidNotAskThisProcessFor) {
   setenv("WATCHDOG_PID", std::to_string(getpid()).c_str(), 1);
   const auto daemon = start("softarmd");
   ASSERT_TRUE(hears("READY=1")) << daemon->printed();
@@ -80,7 +80,7 @@ TEST_P(Service, IsNotToldOfHealthThatItDidNotAskThisProcessFor) {
   EXPECT_EQ(heard_.find("WATCHDOG"), std::string::npos) << heard_;
 }
 
-TEST_P(Service, IsNotToldThatAWrongConfigurationIsReady) {
+TEST_P(Service, IsNotNotifiedThatAWrongConfigurationIsReady) {
   write_config("paper_arm.yaml", "  no_such_key: 1\n");
   for (const char* program : {"softarmd", "softarm-valves"})
     EXPECT_EQ(end_of(*start(program)), 78) << program;

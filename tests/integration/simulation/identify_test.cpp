@@ -39,7 +39,7 @@ TEST(Identify, LeastSquaresFindThePccPlantsOwnParameters) {
   Experiment experiment = load_experiment(kConfig / "paper_simulation.yaml");
   experiment.plant.kind = PccSettings{};
   for (SegmentParameters& segment : experiment.plant.arm.segments) {
-    segment.stiffness_nm_per_rad = 2.7;  // not what the controller believes
+    segment.stiffness_nm_per_rad = 2.7;  // not what the controller is configured with
     segment.damping_nms_per_rad = 0.35;
   }
   const Linear found = linear(experiment, false);
@@ -67,7 +67,7 @@ TEST(Identify, ReadsSixLinksAsTheSegmentTheyAre) {
   EXPECT_NEAR(found.value(1), 0.5, 0.05 * 0.5);
 }
 
-TEST(Identify, RefusesWhatTellsNothing) {
+TEST(Identify, RefusesUninformativeMotion) {
   const Experiment experiment = load_experiment(kConfig / "paper_simulation.yaml");
   FitChoice choice;
   choice.lag = choice.delay = false;

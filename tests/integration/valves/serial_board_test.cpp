@@ -85,7 +85,7 @@ TEST_F(SerialBoard, WhosePlugIsPulledIsNotConnected) {
     return driver_->printed().find("DISCONNECTED (no connection): " + board_.device()) !=
            std::string::npos;
   })) << driver_->printed();
-  EXPECT_EQ(end(*driver_), 1) << "nobody confirmed zero" << driver_->printed();
+  EXPECT_EQ(end(*driver_), 1) << "zero was not confirmed" << driver_->printed();
 }
 
 TEST_F(SerialBoard, BelongsToOneDriver) {

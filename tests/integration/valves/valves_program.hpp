@@ -59,7 +59,7 @@ class ValvesProgram : public ::testing::Test, protected Station {
     node_->publish("SOFTARM_PRESSURE_COMMAND", sent_);
   }
 
-  /// The newest status of the driver, or one that says that it is disconnected.
+  /// The newest status of the driver, or a disconnected one before the first.
   ValvesStatus valves() const { return client_->valves().value_or(ValvesStatus{}); }
   bool is(ValveState state, ValveReason reason) const {
     return client_->valves() && valves().state == state && valves().reason == reason;

@@ -205,7 +205,7 @@ TEST_F(ValvesBehindARelay, WithExplicitArmingCommandsOfZeroComeFirst) {
     ran |= valves().state == ValveState::running;
     return valve_statuses_ > statuses + 5;
   }));
-  EXPECT_FALSE(ran) << "nobody commanded zero";
+  EXPECT_FALSE(ran) << "zero was not commanded";
   ASSERT_TRUE(command_until(0.0, [&] { return valves().state == ValveState::running; }));
   expect_recovery();
 }
@@ -218,12 +218,7 @@ TEST_F(ValvesBehindARelay, ASecondDriverIsKeptOut) {
   const auto plant_of_lcm = start("softarm-plant");  // it would publish the same pressures
   EXPECT_EQ(end_of(*plant_of_lcm), 75) << plant_of_lcm->printed();
   // Another arm by its channels, but the same terminal.
-  std::ofstream(config_, std::ios::app) << "# other\n";
-  const std::string text = [&] {
-    std::ostringstream all;
-    all << std::ifstream(config_).rdbuf();
-    return all.str();
-  }();
+  const std::string text = file_text(config_);
   std::ofstream(config_) << std::regex_replace(
       text, std::regex("lcm: \\{"), "lcm: {command_channel: OTHER, measurement_channel: OTHER_P, ");
   const auto other = start("softarm-valves");

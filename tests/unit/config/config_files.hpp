@@ -1,5 +1,4 @@
-// Configuration files for tests: a folder of its own for every test, and a good experiment to
-// spoil.
+// Configuration files for tests: a separate folder for every test, and a good experiment to change.
 #pragma once
 
 #include <gtest/gtest.h>
