@@ -22,7 +22,7 @@ class StaticReach {
  public:
   explicit StaticReach(const Experiment& experiment)
       : arm_(experiment.arm),
-        workspace_(experiment.arm.size()),
+        workspace_(experiment.arm),
         allocator_(experiment.actuation),
         zero_(Eigen::VectorXd::Zero(experiment.arm.dof())) {}
 
