@@ -1,11 +1,12 @@
-// The loop against the simulated arm: a frame comes in, a pressure goes out. usage: example_loop
-// CONFIG
+// The loop against the simulated arm: a frame comes in, a pressure goes out.
+// usage: example_loop CONFIG
 #include <iostream>
 #include <softarm/config/load.hpp>
 #include <softarm/runtime/control_pipeline.hpp>
 #include <softarm/simulation/simulated_arm.hpp>
 
-int main(int, char** arguments) try {
+int main(int count, char** arguments) try {
+  if (count != 2) throw std::invalid_argument("usage: example_loop CONFIG");
   const softarm::Experiment experiment = softarm::load_experiment(arguments[1]);
   softarm::ControlPipeline pipeline(experiment);   // validate, estimate, (17), allocate, limit
   softarm::SimulatedArm arm(experiment.plant, 0);  // or your motion capture and your valves

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Publishes our motion-capture frames again as the messages that a driver of OptiTrack or Vicon would send.
+"""Publishes our motion-capture frames again as the messages of a driver of OptiTrack or Vicon.
 
 Sends optitrack_frame_t (y up, x y z w, marker frames beside the axis) as config/paper_arm_optitrack.yaml describes it, or
 rigid_transform_t as config/paper_arm_vicon.yaml does. Needs the Python of tools/python_environment.

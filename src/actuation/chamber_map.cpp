@@ -26,8 +26,8 @@ double across(const std::array<double, D>& normal, const std::array<double, D>& 
   return std::abs(value) <= kParallel * std::sqrt(dot<D>(column, column)) ? 0.0 : value;
 }
 
-/// Pressures with a' p = target when nothing nearer to the bias can be told: on the line between
-/// the two extremes.
+/// Pressures with a' p = target if the point nearest to the bias cannot be computed: on the line
+/// between the two extremes.
 double mix(double low, double high, double target) {
   return high > low ? std::clamp((target - low) / (high - low), 0.0, 1.0) : 0.0;
 }
@@ -166,9 +166,8 @@ void ChamberMap<D>::on_facet(const Facet& facet, const Torque& target_nm,
 template <int D>
 void ChamberMap<D>::inside(const Torque& target_nm, Pressures& pressures_bar) const noexcept {
   if (project(target_nm, pressures_bar)) return;
-  // Round-off near the edge: the exact torque all the same, on the line from the middle of the box
-  // to the point of the boundary beyond the target (where the nearest pressures are known in closed
-  // form).
+  // Round-off near the edge: still the exact torque, on the line from the middle of the box to the
+  // point of the boundary beyond the target (where the nearest pressures are known in closed form).
   const double middle = 0.5 * (min_ + max_);
   Torque centre{}, way = target_nm;
   for (int j = 0; j < size_; ++j) {
@@ -179,9 +178,9 @@ void ChamberMap<D>::inside(const Torque& target_nm, Pressures& pressures_bar) co
   int facet = -1;
   for (int f = 0; f < facets_; ++f) {
     const double outward = dot<D>(facet_[f].normal, way);
-    const double room = facet_[f].offset - dot<D>(facet_[f].normal, centre);
-    if (outward > 0.0 && room / outward < reach) {
-      reach = std::max(room, 0.0) / outward;
+    const double margin = facet_[f].offset - dot<D>(facet_[f].normal, centre);
+    if (outward > 0.0 && margin / outward < reach) {
+      reach = std::max(margin, 0.0) / outward;
       facet = f;
     }
   }

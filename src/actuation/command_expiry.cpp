@@ -5,6 +5,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "softarm/base/time.hpp"
+
 namespace softarm {
 namespace {
 
@@ -37,9 +39,9 @@ CommandVerdict CommandExpiry::receive(const PressureCommand& command,
     return CommandVerdict::older;
   }
   sequence_ = command.sequence;
-  // Saturating: a validity of "for ever" must not wrap around into the past.
+  // Saturating: an unlimited validity must not wrap around into the past.
   const std::int64_t validity_ns = std::min(command.validity_ns, longest_ns_);
-  expires_ns_ = validity_ns < kNever - 1 - arrival_ns ? arrival_ns + validity_ns : kNever - 1;
+  expires_ns_ = validity_ns < kForever - 1 - arrival_ns ? arrival_ns + validity_ns : kForever - 1;
   std::copy(command.pressure_bar.begin(), command.pressure_bar.end(), set_points_bar_.data());
   return CommandVerdict::in_force;
 }
@@ -48,7 +50,7 @@ bool CommandExpiry::update(std::int64_t now_ns) noexcept {
   if (now_ns < expires_ns_ || vented()) {
     return false;
   }
-  expires_ns_ = kNever;
+  expires_ns_ = kForever;
   sequence_ = kNoSequence;
   set_points_bar_.setZero();
   return true;

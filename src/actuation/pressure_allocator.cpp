@@ -6,10 +6,13 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "softarm/actuation/input_map.hpp"
+
 namespace softarm {
 namespace {
 
-/// Of what gains and pressures could give together: below it a direction counts as unreachable.
+/// Relative to the torque of all chambers at full pressure: below it a direction counts as
+/// unreachable.
 constexpr double kWeakest = 1e-6;
 
 [[noreturn]] void refuse(int segment, const std::string& what) {
@@ -67,14 +70,14 @@ void check_moments(int segment, const std::vector<Chamber>& moments,
 template <int D>
 void check_span(int segment, const ChamberMap<D>& map, const ActuationSettings& settings) {
   const double weakest = map.weakest_torque_nm(), strongest = map.strongest_torque_nm();
-  const bool no_room = settings.min_pressure_bar == settings.max_pressure_bar;
+  const bool zero_range = settings.min_pressure_bar == settings.max_pressure_bar;
   double together = 0.0;
   for (const Chamber& chamber : settings.segments[static_cast<std::size_t>(segment)]) {
     together += chamber.gain_nm_per_bar *
                 std::max(std::abs(settings.min_pressure_bar), std::abs(settings.max_pressure_bar));
   }
   // A box without size reaches one torque; it is of use only where that is zero.
-  if (no_room ? strongest <= 1e-9 * together : weakest > kWeakest * together) {
+  if (zero_range ? strongest <= 1e-9 * together : weakest > kWeakest * together) {
     return;
   }
   if (settings.min_pressure_bar > 0.0) {
@@ -111,9 +114,9 @@ PressureAllocator::PressureAllocator(const ActuationSettings& settings)
     check_chambers(i, chambers, planar_);
     std::vector<std::array<double, 2>> spatial;
     std::vector<std::array<double, 1>> planar;
-    for (const Chamber& c : chambers) {
-      const std::array<double, 2> column{c.gain_nm_per_bar * std::sin(c.angle_rad),
-                                         -c.gain_nm_per_bar * std::cos(c.angle_rad)};
+    const Eigen::Matrix2Xd map = input_map(settings.kind, chambers);
+    for (const auto& force : map.colwise()) {
+      const std::array<double, 2> column{-force.y(), force.x()};  // A_chamber^-1
       spatial.push_back(column);
       planar.push_back({plane_[0] * column[0] + plane_[1] * column[1]});
     }

@@ -21,16 +21,15 @@ int parse_and_run(int argc, char** argv, CLI::App& app, const std::function<int(
     return body();
   } catch (const CLI::RuntimeError& error) {  // a sub-command's own exit code
     return error.get_exit_code();
-  } catch (const CLI::RequiredError& error) {
-    // An unknown option is the likelier reason why something is missing.
-    const std::vector<std::string> unknown = app.remaining(true);
-    if (!unknown.empty())
-      app.exit(CLI::ExtrasError(app.get_name(), unknown));
-    else
-      app.exit(error);
-    return kExitUsage;
   } catch (const CLI::ParseError& error) {  // --help and --version come this way too
-    return app.exit(error) == 0 ? kExitOk : kExitUsage;
+    // An unknown option is the likelier reason why something is missing.
+    const bool missing = dynamic_cast<const CLI::RequiredError*>(&error) != nullptr ||
+                         dynamic_cast<const CLI::RequiresError*>(&error) != nullptr;
+    const std::vector<std::string> unknown =
+        missing ? app.remaining(true) : std::vector<std::string>();
+    if (unknown.empty()) return app.exit(error) == 0 ? kExitOk : kExitUsage;
+    app.exit(CLI::ExtrasError(app.get_name(), unknown));
+    return kExitUsage;
   } catch (const ConfigError& error) {
     print_error(app.get_name(), error.what());
     return kExitConfiguration;

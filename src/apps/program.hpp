@@ -1,4 +1,4 @@
-// What all executables share: exit codes, --help and --version, how an error is told.
+// Shared by all executables: exit codes, --help and --version, error messages.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -18,18 +18,18 @@ enum ExitCode : int {
   kExitConfiguration = 78,  ///< the configuration is wrong (ConfigError)
 };
 
-/// A file that comes with the programs: `name` in PREFIX/share/softarm of the installed program
-/// that runs, else `source`, where it is in the tree this was built from.
+/// A file installed with the programs: `name` in PREFIX/share/softarm of the running installed
+/// program, otherwise `source` in the source tree.
 std::string shared_file(const std::string& name, const std::string& source);
 
-/// Prints on stderr. What cannot be written (a full disk, a closed pipe) is lost: no program that
-/// moves an arm may end for that.
+/// Prints on stderr. Text that cannot be written (a full disk, a closed pipe) is lost: a program
+/// that moves an arm must not end for that.
 void say(const std::string& text) noexcept;
 
 /// Accepts a finite time above zero, in s.
 CLI::Validator positive_seconds();
 
-/// Accepts a number from `low` to `high`; "nan" is none.
+/// Accepts a number from `low` to `high`; "nan" is refused.
 CLI::Validator number_between(double low, double high);
 
 /// Prints "NAME: error: MESSAGE" on stderr.

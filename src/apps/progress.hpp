@@ -1,4 +1,4 @@
-// A line that moves, on a terminal; silence elsewhere.
+// A progress line that is redrawn on a terminal; no output elsewhere.
 #pragma once
 
 #include <string>
@@ -15,7 +15,7 @@ class Progress {
   /// Shows `text` instead of what was shown before; rate-limited.
   void update(const std::string& text);
 
-  /// Whether update() would show anything now: spares the making of the text.
+  /// Whether update() would show anything now, to avoid formatting text that is not shown.
   bool due() const;
 
  private:

@@ -1,4 +1,4 @@
-// SIGTERM, SIGINT and SIGHUP ask a program to end in good order.
+// SIGTERM, SIGINT and SIGHUP request an orderly end of a program.
 #pragma once
 
 #include <csignal>
@@ -17,12 +17,12 @@ inline void catch_stop_signals() noexcept {
   sigaction(SIGHUP, &action, nullptr);
 }
 
-/// They end the process again.
+/// From now on they end the process again.
 inline void release_stop_signals() noexcept {
   for (const int number : {SIGTERM, SIGINT, SIGHUP}) std::signal(number, SIG_DFL);
 }
 
-/// A reader of our messages that goes away must not end us.
+/// A closed pipe must not end the process: ignores SIGPIPE.
 inline void ignore_broken_pipes() noexcept { std::signal(SIGPIPE, SIG_IGN); }
 
 }  // namespace softarm

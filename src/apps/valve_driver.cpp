@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <array>
+#include <filesystem>
 #include <memory>
 #include <stdexcept>
+#include <string>
 #include <utility>
 
 #include "apps/program.hpp"
@@ -14,6 +16,7 @@
 #include "softarm/base/line_log.hpp"
 #include "softarm/base/realtime.hpp"
 #include "softarm/base/service_notifier.hpp"
+#include "softarm/base/time.hpp"
 #include "softarm/base/version.hpp"
 #include "softarm/config/load.hpp"
 #include "softarm/transport/valves_loop.hpp"
@@ -32,7 +35,8 @@ ValveGuardSettings guard_settings(const Experiment& experiment) {
           .wait_for_zero = experiment.safety.arming == Arming::explicit_};
 }
 
-void print_summary(const char* program, const ValvesLoop& loop, const ValveCounters& counters) {
+void print_summary(const std::string& program, const ValvesLoop& loop,
+                   const ValveCounters& counters) {
   say(fmt::format(
       "{}: {} cycles, {} missed; {} connections, {} lost, {} late answers, {} exception replies, "
       "{} times degraded; {} commands refused\n",
@@ -40,8 +44,9 @@ void print_summary(const char* program, const ValvesLoop& loop, const ValveCount
       counters.no_answers, counters.exceptions, counters.times_degraded, loop.refused()));
 }
 
-/// Prints every change and reports to the service manager; true if zero was confirmed in the end.
-bool drive(const char* program, const Experiment& experiment, ValveDriver& driver) {
+/// Prints every change and reports to the service manager; returns true if zero was confirmed at
+/// the end.
+bool drive(const std::string& program, const Experiment& experiment, ValveDriver& driver) {
   ServiceNotifier service;
   if (!service.problem().empty()) say(fmt::format("{}: warning: {}\n", program, service.problem()));
   LineLog log(program, say);  // before the scheduling changes, which its thread would inherit
@@ -56,8 +61,7 @@ bool drive(const char* program, const Experiment& experiment, ValveDriver& drive
       loop.run([] { return stop_requested != 0; },
                [&](const ValvesLoop::Report& report) {
                  if (report.changed)
-                   log.add("{:.3f} s: {}", 1e-9 * static_cast<double>(report.since_start_ns),
-                           driver.text(text));
+                   log.add("{:.3f} s: {}", to_seconds(report.since_start_ns), driver.text(text));
                  service.report(report.now_ns, {.state = name(driver.guard().state()),
                                                 .reason = name(driver.guard().reason()),
                                                 .on_time = report.on_time,
@@ -68,7 +72,7 @@ bool drive(const char* program, const Experiment& experiment, ValveDriver& drive
   return vented;
 }
 
-int serve(const char* program, const std::string& path) {
+int serve(const std::string& program, const std::string& path) {
   const Experiment experiment = load_experiment(path);
   if (experiment.actuation.kind == ActuationKind::torque)
     throw ConfigError(path, 0, "actuation.kind", "chambers: a terminal has valves, not moments",
@@ -102,7 +106,8 @@ int serve(const char* program, const std::string& path) {
 
 }  // namespace
 
-int run_valve_driver(const char* program, int argc, char** argv) {
+int run_valve_driver(int argc, char** argv) {
+  const std::string program = std::filesystem::path(argv[0]).filename().string();
   CLI::App app("Pressure commands from LCM to valves, measured pressures back", program);
   std::string config;
   app.add_option("CONFIG", config, "experiment in YAML")->required();

@@ -1,7 +1,5 @@
 #include "softarm/base/clock.hpp"
 
-#include <time.h>
-
 #include <algorithm>
 
 #include "softarm/base/time.hpp"
@@ -13,6 +11,10 @@ constexpr std::int64_t kNsPerSecond = 1'000'000'000;
 constexpr std::int64_t kTogether_ns = 5000;
 constexpr int kAttempts = 4;
 
+timespec to_timespec(std::int64_t time_ns) noexcept {
+  return {.tv_sec = time_ns / kNsPerSecond, .tv_nsec = time_ns % kNsPerSecond};
+}
+
 std::int64_t read_ns(clockid_t clock) noexcept {
   timespec now{};
   clock_gettime(clock, &now);
@@ -22,13 +24,15 @@ std::int64_t read_ns(clockid_t clock) noexcept {
 }  // namespace
 
 std::int64_t monotonic_now_ns() noexcept { return read_ns(CLOCK_MONOTONIC); }
+std::int64_t wall_now_ns() noexcept { return read_ns(CLOCK_REALTIME); }
+std::int64_t thread_cpu_ns() noexcept { return read_ns(CLOCK_THREAD_CPUTIME_ID); }
 
 ClockPair read_clocks() noexcept {
   ClockPair best{};
   std::int64_t least_ns = kForever;
   std::int64_t before_ns = monotonic_now_ns();
   for (int attempt = 0; attempt < kAttempts && least_ns > kTogether_ns; ++attempt) {
-    const std::int64_t wall_ns = read_ns(CLOCK_REALTIME), after_ns = monotonic_now_ns();
+    const std::int64_t wall_ns = wall_now_ns(), after_ns = monotonic_now_ns();
     if (after_ns - before_ns < least_ns) best = {after_ns, wall_ns};
     least_ns = std::min(least_ns, after_ns - before_ns);
     before_ns = after_ns;
@@ -37,9 +41,12 @@ ClockPair read_clocks() noexcept {
 }
 
 void sleep_until_ns(std::int64_t deadline_ns) noexcept {
-  const timespec deadline{.tv_sec = deadline_ns / kNsPerSecond,
-                          .tv_nsec = deadline_ns % kNsPerSecond};
+  const timespec deadline = to_timespec(deadline_ns);
   clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &deadline, nullptr);
+}
+
+timespec time_left(std::int64_t deadline_ns) noexcept {
+  return to_timespec(std::max<std::int64_t>(0, deadline_ns - monotonic_now_ns()));
 }
 
 }  // namespace softarm

@@ -14,8 +14,8 @@ namespace {
 
 constexpr std::size_t kPrefaultedStack = std::size_t{256} * 1024;
 
-/// A stack grows by page faults, also when memory is locked: every page that a tick may need is
-/// touched before. Not inlined, or the caller would keep the array.
+/// A stack grows by page faults, even when memory is locked: this touches every page that a tick
+/// may need in advance. Not inlined, or the caller would keep the array.
 [[gnu::noinline]] void prefault_stack() noexcept {
   char pages[kPrefaultedStack];
   volatile char* const touched = pages;

@@ -17,7 +17,7 @@ namespace {
 
 constexpr std::size_t kLongestWord = 60;
 
-/// A whole number above zero in an environment variable; 0 where there is none.
+/// The positive integer in an environment variable; 0 where there is none.
 std::int64_t positive(const char* variable) {
   const char* text = std::getenv(variable);
   if (text == nullptr) return 0;
@@ -26,7 +26,7 @@ std::int64_t positive(const char* variable) {
   return error == std::errc() && *end == '\0' ? std::max<std::int64_t>(value, 0) : 0;
 }
 
-/// Lines into a buffer that is there already.
+/// Appends lines to a preallocated buffer.
 class Message {
  public:
   void add(std::string_view part) noexcept {
@@ -61,11 +61,13 @@ void ServiceNotifier::open(std::string_view address) {
   static_assert(sizeof(sockaddr_un) <= sizeof address_);
   auto* const to = new (address_.data()) sockaddr_un{};
   const bool abstract = address.front() == '@';
-  // A path needs room for the zero that ends it.
+  // A path needs space for its terminating zero.
   if ((!abstract && address.front() != '/') ||
       address.size() + (abstract ? 0 : 1) > sizeof to->sun_path) {
-    problem_ = "cannot tell the service manager: NOTIFY_SOCKET is no path and no @name of up to " +
-               std::to_string(sizeof to->sun_path) + " characters: " + std::string(address);
+    problem_ =
+        "cannot notify the service manager: NOTIFY_SOCKET is neither a path nor an @name of up "
+        "to " +
+        std::to_string(sizeof to->sun_path) + " characters: " + std::string(address);
     return;
   }
   to->sun_family = AF_UNIX;
@@ -75,14 +77,14 @@ void ServiceNotifier::open(std::string_view address) {
       static_cast<unsigned>(offsetof(sockaddr_un, sun_path) + address.size() + (abstract ? 0 : 1));
   socket_ = socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
   if (socket_ < 0)
-    problem_ = std::string("cannot tell the service manager: ") + std::strerror(errno);
+    problem_ = std::string("cannot notify the service manager: ") + std::strerror(errno);
 }
 
 void ServiceNotifier::report(std::int64_t now_ns, const ServiceReport& report) noexcept {
   if (socket_ < 0) return;
   const bool changed = report.state != state_ || report.reason != reason_;
-  const bool alive = alive_every_ns_ > 0 && report.on_time &&
-                     (alive_ns_ == 0 || now_ns - alive_ns_ >= alive_every_ns_);
+  const bool alive =
+      alive_every_ns_ > 0 && report.on_time && age_ns(now_ns, alive_ns_) >= alive_every_ns_;
   Message message;
   if (!ready_) message.add("READY=1\n");
   if (report.stopping && !stopping_) message.add("STOPPING=1\n");

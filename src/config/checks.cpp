@@ -3,7 +3,6 @@
 #include <arpa/inet.h>
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cctype>
 #include <cmath>
 #include <cstring>
@@ -11,11 +10,12 @@
 #include <set>
 #include <stdexcept>
 
+#include "config/describe.hpp"
 #include "softarm/actuation/pressure_allocator.hpp"
+#include "softarm/base/time.hpp"
 #include "softarm/control/curvature_controller.hpp"
 #include "softarm/control/reference.hpp"
-#include "softarm/runtime/settings.hpp"
-#include "softarm/transport/settings.hpp"
+#include "softarm/runtime/safety_monitor.hpp"
 #include "softarm/valves/register_map.hpp"
 
 namespace softarm {
@@ -26,317 +26,305 @@ constexpr double kLongestVent_s = 1.0;
 constexpr double kRotationTolerance = 1e-6;
 constexpr double kInPlane_rad = 1e-6;
 
+std::string in_quotes(const std::string& text) { return "\"" + text + "\""; }
+
 class Checks {
  public:
-  Checks(const Experiment& experiment, const ExperimentReader& reader)
-      : experiment_(experiment), reader_(reader) {}
+  Checks(const Experiment& experiment, const ConfigKeys& keys)
+      : experiment_(experiment), keys_(keys) {}
 
   void run() const {
     check_rotation("arm.base.rotation", experiment_.arm.base_rotation);
     check_rotation("plant.arm.base.rotation", experiment_.plant.arm.base_rotation);
     check_rotation("daemon.mocap.axes", experiment_.transport.mocap.axes);
     check_radius("arm", experiment_.arm, false);
-    check_radius("plant.arm", experiment_.plant.arm, experiment_.plant.kind == PlantKind::links);
+    check_radius("plant.arm", experiment_.plant.arm,
+                 experiment_.plant.kind.get_if<LinkSettings>() != nullptr);
     check_actuation("actuation", experiment_.actuation);
     check_actuation("plant.actuation", experiment_.plant.actuation);
     check_same_chambers();
-    check_reference();
     check_bodies();
     check_safety();
     check_lcm();
     check_valves();
-    check_rooms();
+    check_loads();
+    check_module("control", "settings the controller can use", [&] {
+      std::make_unique<CurvatureController>(experiment_.arm, experiment_.control);
+    });
+    check_reference();
   }
 
  private:
   void require(bool holds, const std::string& key, const std::string& expected,
                const std::string& got) const {
-    if (!holds) throw reader_.error_at(key, expected, got);
+    if (!holds) throw keys_.error_at(key, expected, got);
+  }
+
+  /// Compares a key's value with a bound; `what` names the bound, `why` gives the reason.
+  void compare(bool holds, const char* relation, const std::string& key, double value, double bound,
+               const char* what, const char* why) const {
+    const std::string_view unit = Key{key.c_str(), ""}.unit();
+    const std::string unit_behind = unit.empty() ? "" : fmt::format(" {}", unit);
+    require(holds, key, fmt::format("{} {} ({:.6g}{}){}", relation, what, bound, unit_behind, why),
+            fmt::format("{:.6g}{}", value, unit_behind));
+  }
+  void at_least(const std::string& key, double value, double bound, const char* what) const {
+    compare(value >= bound, "at least", key, value, bound, what, "");
+  }
+  void above(const std::string& key, double value, double bound, const char* what,
+             const char* why = "") const {
+    compare(value > bound, "more than", key, value, bound, what, why);
+  }
+  void below(const std::string& key, double value, double bound, const char* what,
+             const char* why = "") const {
+    compare(value < bound, "less than", key, value, bound, what, why);
+  }
+
+  template <typename Set, typename Item>
+  void once(Set& seen, const Item& item, const std::string& key, const std::string& expected,
+            const std::string& got) const {
+    require(seen.insert(item).second, key, expected, got);
+  }
+
+  /// Errors thrown by the modules, such as a map of chambers that cannot reach every direction.
+  template <typename Build>
+  void check_module(const std::string& key, const char* expected, const Build& build) const {
+    try {
+      build();
+    } catch (const std::invalid_argument& error) {
+      throw keys_.error_at(key, expected, error.what());
+    }
   }
 
   void check_rotation(const std::string& key, const Eigen::Matrix3d& r) const {
     const double deviation =
         (r.transpose() * r - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
-    const double determinant = r.determinant();
-    require(
-        deviation < kRotationTolerance && determinant > 0.0, key,
-        "a rotation: orthonormal, determinant +1",
-        fmt::format("R'R off the identity by {:.2g}, determinant {:.6g}", deviation, determinant));
+    require(deviation < kRotationTolerance && r.determinant() > 0.0, key,
+            "a rotation: orthonormal, determinant +1",
+            fmt::format("R'R off the identity by {:.2g}, determinant {:.6g}", deviation,
+                        r.determinant()));
   }
 
   /// Rotary inertia needs a cross-section that the model has.
   void check_radius(const std::string& key, const ArmParameters& arm, bool links) const {
-    const auto thick = [](const SegmentParameters& segment) { return segment.radius_m > 0.0; };
-    const bool asked = std::any_of(arm.segments.begin(), arm.segments.end(), thick);
+    const bool asked = std::any_of(arm.segments.begin(), arm.segments.end(),
+                                   [](const auto& segment) { return segment.radius_m > 0.0; });
     require(!asked || (arm.mass == MassModel::distributed && !links), key + ".radius_m",
             "0 where mass is in points or the arm is made of links: they have no cross-section",
             "a radius");
   }
 
-  void check_actuation(const std::string& key, const ActuationSettings& actuation) const {
-    const double low = actuation.min_pressure_bar;
-    const double high = actuation.max_pressure_bar;
-    const double bias = actuation.bias_pressure_bar;
-    require(low < high, key + ".max_pressure_bar",
-            fmt::format("more than min_pressure_bar ({} bar)", low), fmt::format("{} bar", high));
+  void check_actuation(const std::string& key, const ActuationSettings& it) const {
+    const double low = it.min_pressure_bar, high = it.max_pressure_bar, bias = it.bias_pressure_bar;
+    const bool torque = it.kind == ActuationKind::torque;
+    above(key + ".max_pressure_bar", high, low, "min_pressure_bar");
     require(low <= bias && bias <= high, key + ".bias_pressure_bar",
             fmt::format("between min and max_pressure_bar ([{}, {}] bar)", low, high),
             fmt::format("{} bar", bias));
-    const bool torque = actuation.kind == ActuationKind::torque;
-    const double vent_s = std::max(high, -low) / actuation.vent_bar_per_s;
-    const char* unit = torque ? "N m/s" : "bar/s";
-    require(vent_s < kLongestVent_s, key + (torque ? ".vent_nm_per_s" : ".vent_bar_per_s"),
-            fmt::format("more than {} {}, so that venting takes less than {} s",
-                        std::max(high, -low) / kLongestVent_s, unit, kLongestVent_s),
-            fmt::format("{} {}", actuation.vent_bar_per_s, unit));
-    if (torque) return;
-    const std::size_t fewest = actuation.plane_rad ? 2 : 3;
-    for (const auto& chambers : actuation.segments) {
-      require(chambers.size() >= fewest, key + ".chambers",
-              fmt::format("at least {} chambers a segment{}", fewest,
-                          actuation.plane_rad ? " of a planar arm"
-                                              : " (2 for a planar arm with plane_rad)"),
-              fmt::format("{}", chambers.size()));
+    above(key + (torque ? ".vent_nm_per_s" : ".vent_bar_per_s"), it.vent_bar_per_s,
+          std::max(high, -low) / kLongestVent_s, "what it takes to vent in less than 1 s");
+    const std::size_t fewest = it.plane_rad ? 2 : 3;
+    for (const auto& chambers : it.segments) {
+      require(
+          torque || chambers.size() >= fewest, key + ".chambers",
+          fmt::format("at least {} chambers a segment{}", fewest,
+                      it.plane_rad ? " of a planar arm" : " (2 for a planar arm with plane_rad)"),
+          fmt::format("{}", chambers.size()));
     }
+    check_module(key + ".chambers", "chambers that reach every direction the arm needs",
+                 [&] { PressureAllocator allocator(it); });
   }
 
   void check_same_chambers() const {
-    const bool torque = experiment_.actuation.kind == ActuationKind::torque;
-    require(experiment_.plant.actuation.kind == experiment_.actuation.kind, "plant.actuation.kind",
-            "the same as actuation.kind", torque ? "chambers" : "torque");
+    const auto& model = experiment_.actuation;
+    const auto& plant = experiment_.plant.actuation;
+    const bool torque = model.kind == ActuationKind::torque;
+    require(plant.kind == model.kind, "plant.actuation.kind", "the same as actuation.kind",
+            torque ? "chambers" : "torque");
     require(!torque || !experiment_.safety.valve_readback, "daemon.safety.valve_readback",
             "false with actuation by torque: it is for simulated arms, which have no valves then",
             "true");
-    for (std::size_t i = 0; i < experiment_.actuation.segments.size(); ++i) {
-      const auto commanded = experiment_.actuation.segments[i].size();
-      const auto there = experiment_.plant.actuation.segments[i].size();
-      require(commanded == there, "plant.actuation.chambers",
-              fmt::format("as many chambers as actuation.chambers ({}) in segment {}", commanded,
-                          i + 1),
-              fmt::format("{}", there));
-    }
-  }
-
-  /// Distance (rad) of a segment's u from the plane of a planar arm.
-  double out_of_plane(double x, double y) const {
-    if (!experiment_.actuation.plane_rad) return 0.0;
-    const double plane = *experiment_.actuation.plane_rad;
-    return std::abs(y * std::cos(plane) - x * std::sin(plane));
-  }
-
-  void check_pose(const std::string& key, const std::vector<double>& u) const {
-    for (std::size_t i = 0; i + 1 < u.size(); i += 2) {
-      const double theta = std::hypot(u[i], u[i + 1]);
-      const double outside = out_of_plane(u[i], u[i + 1]);
-      require(outside < kInPlane_rad, key, "a bend in the plane of actuation.plane_rad",
-              fmt::format("{:.3g} rad out of it in segment {}", outside, i / 2 + 1));
-      require(theta <= experiment_.control.max_theta_rad, key,
-              fmt::format("theta within control.max_theta_rad ({} rad)",
-                          experiment_.control.max_theta_rad),
-              fmt::format("{:.6g} rad in segment {}", theta, i / 2 + 1));
+    for (std::size_t i = 0; i < model.segments.size(); ++i) {
+      const auto expected = model.segments[i].size(), got = plant.segments[i].size();
+      require(expected == got, "plant.actuation.chambers",
+              fmt::format("as many as actuation.chambers ({}) in segment {}", expected, i + 1),
+              fmt::format("{}", got));
     }
   }
 
   void check_reference() const {
+    try {
+      Reference(experiment_.reference, experiment_.control, experiment_.arm);
+    } catch (const ReferenceError& error) {
+      throw keys_.error_at(error.key, error.expected, error.got);
+    } catch (const std::invalid_argument& error) {
+      throw keys_.error_at("reference", "a reference that can be followed", error.what());
+    }
+    if (!experiment_.actuation.plane_rad) return;
     const auto& phases = experiment_.reference.phases;
     for (std::size_t i = 0; i < phases.size(); ++i) {
       const std::string key = fmt::format("reference[{}]", i);
-      if (const auto* hold = std::get_if<SetPointReference>(&phases[i].kind)) {
-        check_pose(key, hold->u_rad);
-      } else if (const auto* paper = std::get_if<PaperReference>(&phases[i].kind)) {
-        require(paper->theta_rad <= experiment_.control.max_theta_rad, key + ".theta_rad",
-                fmt::format("at most control.max_theta_rad ({} rad)",
-                            experiment_.control.max_theta_rad),
-                fmt::format("{} rad", paper->theta_rad));
-        const double outside =
-            out_of_plane(std::cos(paper->phi_centre_rad), std::sin(paper->phi_centre_rad));
-        require(!experiment_.actuation.plane_rad ||
-                    (outside < kInPlane_rad && paper->phi_amplitude_rad == 0.0),
-                key, "a reference in the plane of actuation.plane_rad", "one that leaves it");
-      } else if (const auto* way = std::get_if<WayPointReference>(&phases[i].kind)) {
-        check_way_points(key + ".points", *way);
+      if (const auto* hold = phases[i].kind.get_if<SetPointReference>()) {
+        check_in_plane(key, hold->u_rad);
+      } else if (const auto* paper = phases[i].kind.get_if<PaperReference>()) {
+        check_in_plane(key, {std::cos(paper->phi_centre_rad), std::sin(paper->phi_centre_rad)});
+        require(paper->phi_amplitude_rad == 0.0, key,
+                "a reference in the plane of actuation.plane_rad", "one that leaves it");
+      } else if (const auto* way = phases[i].kind.get_if<WayPointReference>()) {
+        for (std::size_t j = 0; j < way->points.size(); ++j)
+          check_in_plane(fmt::format("{}.points[{}]", key, j), way->points[j].u_rad);
       }
     }
   }
 
-  void check_way_points(const std::string& key, const WayPointReference& way) const {
-    for (std::size_t j = 0; j < way.points.size(); ++j) {
-      const std::string at = fmt::format("{}[{}]", key, j);
-      check_pose(at, way.points[j].u_rad);
-      require(j == 0 || way.points[j].time_s > way.points[j - 1].time_s, at + ".time_s",
-              "later than the point before", fmt::format("{} s", way.points[j].time_s));
+  /// Of a planar arm.
+  void check_in_plane(const std::string& key, const std::vector<double>& u) const {
+    const double plane = *experiment_.actuation.plane_rad;
+    for (std::size_t i = 0; i + 1 < u.size(); i += 2) {
+      const double outside = std::abs(u[i + 1] * std::cos(plane) - u[i] * std::sin(plane));
+      require(outside < kInPlane_rad, key, "a bend in the plane of actuation.plane_rad",
+              fmt::format("{:.3g} rad out of it in segment {}", outside, i / 2 + 1));
     }
-    require(!way.repeat || way.points.size() >= 2, key, "at least 2 points to repeat",
-            fmt::format("{}", way.points.size()));
   }
 
   void check_bodies() const {
     const BodySettings& bodies = experiment_.transport.bodies;
     std::set<int> seen;
     for (const int id : bodies.segment_ids) {
-      require(seen.insert(id).second, "daemon.bodies.segment_ids", "every body once",
-              fmt::format("body {} twice", id));
+      once(seen, id, "daemon.bodies.segment_ids", "every body once",
+           fmt::format("body {} twice", id));
     }
-    require(bodies.base_id < 0 || seen.insert(bodies.base_id).second, "daemon.bodies.base_id",
-            "a body that is no segment's end", fmt::format("{}", bodies.base_id));
+    if (bodies.base_id < 0) return;
+    once(seen, bodies.base_id, "daemon.bodies.base_id", "a body that is no segment's end",
+         fmt::format("{}", bodies.base_id));
   }
 
-  /// Letters, digits and a few signs: names need no quoting in LCM's regular expressions, nor by
-  /// people.
-  void check_word(const std::string& key, const std::string& name) const {
-    const bool word = std::all_of(name.begin(), name.end(), [](char c) {
-      return std::isalnum(static_cast<unsigned char>(c)) || std::strchr("_-./", c) != nullptr;
-    });
-    require(word, key, "letters, digits, _ - . /", "\"" + name + "\"");
-  }
-
-  /// Where every body has a channel of its own.
-  void check_body_channels(std::set<std::string>& seen) const {
-    const TransportSettings& transport = experiment_.transport;
-    if (transport.mocap.source != MocapSourceKind::rigid_transform) return;
-    const auto check = [&](const std::string& key, const PlateSettings& plate) {
-      check_word(key, plate.name);
-      const std::string channel = body_channel(transport.lcm, plate);
-      require(channel.size() <= 63, key, "a channel of at most 63 characters", channel);
-      require(seen.insert(channel).second, key, "a channel of its own",
-              "\"" + channel + "\", which another key names too");
-    };
-    if (transport.bodies.base_id >= 0)
-      check("daemon.bodies.base_plate.name", transport.bodies.base_plate);
-    for (const PlateSettings& plate : transport.bodies.segment_plates)
-      check("daemon.bodies.segment_plates", plate);
-  }
-
+  /// A threshold that another one hides never takes effect, so it protects nothing.
   void check_safety() const {
-    const SafetySettings& safety = experiment_.safety;
-    require(safety.hold_after_s == 0.0 || safety.vent_after_s == 0.0 ||
-                safety.hold_after_s <= safety.vent_after_s,
-            "daemon.safety.vent_after_s",
-            fmt::format("at least hold_after_s ({} s)", safety.hold_after_s),
-            fmt::format("{} s", safety.vent_after_s));
-    require(safety.hold_overruns <= safety.vent_overruns, "daemon.safety.vent_overruns",
-            fmt::format("at least hold_overruns ({})", safety.hold_overruns),
-            fmt::format("{}", safety.vent_overruns));
-    require(safety.frame_latency_s <= safety.max_latency_s, "daemon.safety.max_latency_s",
-            fmt::format("at least frame_latency_s ({} s)", safety.frame_latency_s),
-            fmt::format("{} s", safety.max_latency_s));
-    const double period_s = 1.0 / experiment_.rate_hz;
-    for (const auto& [key, time_s] : {std::pair{"valve_silence_s", safety.valve_silence_s},
-                                      std::pair{"deadman_timeout_s", safety.deadman_timeout_s}})
-      require(time_s >= 2.0 * period_s, fmt::format("daemon.safety.{}", key),
-              fmt::format("at least two ticks of daemon.rate_hz ({:.6g} s)", 2.0 * period_s),
-              fmt::format("{} s", time_s));
-    require(experiment_.safety.command_validity_s >= 2.0 * period_s,
-            "daemon.lcm.command_validity_s",
-            fmt::format("at least two ticks of daemon.rate_hz ({:.6g} s)", 2.0 * period_s),
-            fmt::format("{} s", experiment_.safety.command_validity_s));
+    const SafetySettings& it = experiment_.safety;
+    const double tick_s = 1.0 / experiment_.rate_hz;
+    const SafetyThresholds resolved = resolve_thresholds(it, tick_s);
+    const double hold_s = to_seconds(resolved.hold_after_ns);
+    const double vent_s = to_seconds(resolved.vent_after_ns);
+    if (it.vent_after_s == 0.0 && it.hold_after_s > 0.0) {
+      below("daemon.safety.hold_after_s", hold_s, vent_s, "vent_after_s, left out",
+            ": otherwise HOLD is never reached; give both");
+    }
+    above("daemon.safety.vent_after_s", vent_s, hold_s, "hold_after_s",
+          ": otherwise HOLD is never reached; give both");
+    above("daemon.safety.hold_after_s", hold_s, it.frame_period_s + it.frame_latency_s,
+          "frame_period_s + frame_latency_s", ": otherwise HOLD is never left");
+    above("daemon.safety.vent_overruns", it.vent_overruns, it.hold_overruns, "hold_overruns",
+          ": otherwise they never cause HOLD");
+    at_least("daemon.safety.max_latency_s", it.max_latency_s, it.frame_latency_s,
+             "frame_latency_s");
+    above("estimation.max_speed_radps", experiment_.estimation.max_speed_radps,
+          experiment_.control.max_speed_radps, "control.max_speed_radps",
+          ": otherwise frames are rejected before that limit is seen");
+    if (it.valve_readback) {
+      below("daemon.safety.pressure_tolerance_bar", it.pressure_tolerance_bar,
+            experiment_.actuation.max_pressure_bar, "actuation.max_pressure_bar",
+            ": otherwise no leak is ever seen");
+    }
+    for (const auto& [key, time_s] : {std::pair("safety.valve_silence_s", it.valve_silence_s),
+                                      std::pair("safety.deadman_timeout_s", it.deadman_timeout_s),
+                                      std::pair("lcm.command_validity_s", it.command_validity_s)})
+      at_least(fmt::format("daemon.{}", key), time_s, 2.0 * tick_s, "two ticks of daemon.rate_hz");
+  }
+
+  /// Letters, digits and a few signs: names need no quoting in LCM's regular expressions or in a
+  /// shell.
+  void check_channel(std::set<std::string>& seen, const std::string& key, const std::string& word,
+                     const std::string& channel) const {
+    const bool plain = std::all_of(word.begin(), word.end(), [](unsigned char c) {
+      return std::isalnum(c) != 0 || std::strchr("_-./", c) != nullptr;
+    });
+    require(plain, key, "letters, digits, _ - . /", in_quotes(word));
+    require(channel.size() <= 63, key, "a channel of at most 63 characters", channel);
+    once(seen, channel, key, "a separate channel",
+         in_quotes(channel) + ", which another key names too");
   }
 
   void check_lcm() const {
-    const LcmSettings& lcm = experiment_.transport.lcm;
-    const std::pair<const char*, const std::string&> channels[] = {
-        {"mocap_channel", lcm.mocap_channel},
-        {"command_channel", lcm.command_channel},
-        {"measurement_channel", lcm.measurement_channel},
-        {"reference_channel", lcm.reference_channel},
-        {"operator_channel", lcm.operator_channel},
-        {"status_channel", lcm.status_channel},
-        {"timing_channel", lcm.timing_channel},
-        {"tick_channel", lcm.tick_channel},
-        {"valves_channel", lcm.valves_channel},
-        {"plant_channel", lcm.plant_channel},
-        {"deadman_channel", lcm.deadman_channel}};
+    const TransportSettings& transport = experiment_.transport;
     std::set<std::string> seen;
-    for (const auto& [key, name] : channels) {
-      if (name.empty()) continue;  // what may be left out
-      check_word(fmt::format("daemon.lcm.{}", key), name);
-      require(seen.insert(name).second, fmt::format("daemon.lcm.{}", key), "a channel of its own",
-              "\"" + name + "\", which another key names too");
+    for (const ChannelKey& it : kChannelKeys) {
+      const std::string& name = transport.lcm.*it.channel;
+      if (!name.empty()) check_channel(seen, fmt::format("daemon.lcm.{}", it.name), name, name);
     }
-    check_body_channels(seen);
-    require(lcm.url.find("://") != std::string::npos, "daemon.lcm.url",
-            "an LCM provider, such as udpm://239.255.76.67:7667?ttl=0", "\"" + lcm.url + "\"");
-    // LCM takes a group without a port for port 0, where nobody hears another.
-    const std::string network = lcm.url.substr(0, lcm.url.find('?'));
+    if (transport.mocap.source.channel_per_body) {  // every body has its own
+      const auto check = [&](const char* key, const MarkerFrameSettings& body) {
+        check_channel(seen, key, body.name, body_channel(transport.lcm, body));
+      };
+      const BodySettings& bodies = transport.bodies;
+      if (bodies.base_id >= 0) check("daemon.bodies.base_plate.name", bodies.base_plate);
+      for (const auto& body : bodies.segment_plates) check("daemon.bodies.segment_plates", body);
+    }
+    const std::string& url = transport.lcm.url;
+    const std::string example = ", such as udpm://239.255.76.67:7667?ttl=0";
+    require(url.find("://") != std::string::npos, "daemon.lcm.url", "an LCM provider" + example,
+            in_quotes(url));
+    // LCM takes a group without a port as port 0, where no process receives from another.
+    const std::string network = url.substr(0, url.find('?'));
     require(!network.starts_with("udpm://") || network == "udpm://" ||
                 network.find(':', 7) != std::string::npos,
-            "daemon.lcm.url", "a port behind the group, such as udpm://239.255.76.67:7667?ttl=0",
-            "\"" + lcm.url + "\"");
+            "daemon.lcm.url", "a port behind the group" + example, in_quotes(url));
   }
 
   void check_valves() const {
-    const ValveDriverSettings& valves = experiment_.valves;
-    // Arms that have no terminal need not fit into one.
-    if (experiment_.actuation.kind == ActuationKind::torque || !reader_.given("valves")) return;
+    const ValveDriverSettings& it = experiment_.valves;
+    const double max_bar = experiment_.actuation.max_pressure_bar;
+    // Arms without a terminal need not fit one.
+    if (experiment_.actuation.kind == ActuationKind::torque || !keys_.given("valves")) return;
     std::set<int> seen;
-    for (const int valve : valves.order) {
-      require(seen.insert(valve).second, "valves.order", "every valve once",
-              fmt::format("valve {} twice", valve));
-    }
-    const double period_s = 1.0 / valves.rate_hz;
-    require(valves.response_timeout_s < period_s, "valves.response_timeout_s",
-            fmt::format("less than one period of valves.rate_hz ({:.6g} s)", period_s),
-            fmt::format("{} s", valves.response_timeout_s));
-    require(valves.backoff_s <= valves.longest_backoff_s, "valves.longest_backoff_s",
-            fmt::format("at least backoff_s ({} s)", valves.backoff_s),
-            fmt::format("{} s", valves.longest_backoff_s));
-    const double silent_s = (valves.tolerated_failures + 1) * period_s;
-    require(valves.failsafe_timeout_s >= silent_s, "valves.failsafe_timeout_s",
+    for (const int valve : it.order)
+      once(seen, valve, "valves.order", "every valve once", fmt::format("valve {} twice", valve));
+    const double period_s = 1.0 / it.rate_hz;
+    const double silent_s = (it.tolerated_failures + 1) * period_s;
+    below("valves.response_timeout_s", it.response_timeout_s, period_s,
+          "one period of valves.rate_hz");
+    at_least("valves.longest_backoff_s", it.longest_backoff_s, it.backoff_s, "backoff_s");
+    below("valves.stuck_bar", it.stuck_bar, max_bar, "actuation.max_pressure_bar",
+          ": otherwise no valve ever counts as stuck");
+    require(it.failsafe_timeout_s >= silent_s, "valves.failsafe_timeout_s",
             fmt::format("at least {:.6g} s (tolerated_failures + 1 periods)", silent_s),
-            fmt::format("{} s", valves.failsafe_timeout_s));
-    if (valves.backend == "modbus") check_terminal(valves);
+            fmt::format("{} s", it.failsafe_timeout_s));
+    if (it.backend == "modbus") check_terminal(it);
   }
 
-  void check_terminal(const ValveDriverSettings& valves) const {
+  void check_terminal(const ValveDriverSettings& it) const {
     in_addr address{};
-    require(inet_pton(AF_INET, valves.host.c_str(), &address) == 1, "valves.host",
-            "an IPv4 address", "\"" + valves.host + "\"");
-    const RegisterMap& map = valves.registers;
-    require(valves.failsafe_timeout_s >= map.timeout_least_s, "valves.failsafe_timeout_s",
-            fmt::format("at least {:.6g} s, what the terminal takes", map.timeout_least_s),
-            fmt::format("{} s", valves.failsafe_timeout_s));
-    const double units = valves.failsafe_timeout_s / map.timeout_unit_s;
-    require(units >= 0.5 && units < (map.timeout_words == 2 ? 4294967295.0 : 65535.0),
+    require(inet_pton(AF_INET, it.host.c_str(), &address) == 1, "valves.host", "an IPv4 address",
+            in_quotes(it.host));
+    require(it.failsafe_timeout_s >= it.registers.timeout_least_s, "valves.failsafe_timeout_s",
+            fmt::format("at least {:.6g} s, what the terminal takes", it.registers.timeout_least_s),
+            fmt::format("{} s", it.failsafe_timeout_s));
+    const double units = it.failsafe_timeout_s / it.registers.timeout_unit_s;
+    require(units >= 0.5 && units < (it.registers.timeout_words == 2 ? 4294967295.0 : 65535.0),
             "valves.failsafe_timeout_s", "a time-out that fits its register",
             fmt::format("{:.6g} units", units));
     const std::string fault =
-        register_map_fault(map, valves.order, experiment_.actuation.max_pressure_bar);
+        register_map_fault(it.registers, it.order, experiment_.actuation.max_pressure_bar);
     require(fault.empty(), "valves.registers", "registers that fit together", fault);
   }
 
-  /// What the rooms themselves refuse: a map of chambers that cannot reach every direction, and the
-  /// like.
-  template <typename Build>
-  void check_room(const std::string& key, const std::string& expected, const Build& build) const {
-    try {
-      build();
-    } catch (const std::invalid_argument& error) {
-      throw reader_.error_at(key, expected, error.what());
+  void check_loads() const {
+    const auto& loads = experiment_.plant.loads;
+    const int n = experiment_.arm.size();
+    for (std::size_t i = 0; i < loads.size(); ++i) {
+      require(loads[i].segment <= n, fmt::format("plant.loads[{}].segment", i),
+              fmt::format("a whole number in [0, {}]", n), fmt::format("{}", loads[i].segment));
     }
   }
 
-  void check_rooms() const {
-    const std::string spanning = "chambers that reach a torque in every direction the arm needs";
-    check_room("actuation.chambers", spanning,
-               [&] { PressureAllocator allocator(experiment_.actuation); });
-    check_room("plant.actuation.chambers", spanning,
-               [&] { PressureAllocator allocator(experiment_.plant.actuation); });
-    check_room("control", "settings the controller can use", [&] {
-      std::make_unique<CurvatureController>(experiment_.arm, experiment_.control);
-    });
-    check_room("reference", "a reference that can be followed", [&] {
-      Reference reference(experiment_.reference, experiment_.control, experiment_.arm);
-    });
-  }
-
   const Experiment& experiment_;
-  const ExperimentReader& reader_;
+  const ConfigKeys& keys_;
 };
 
 }  // namespace
 
-void check_consistency(const Experiment& experiment, const ExperimentReader& reader) {
-  Checks(experiment, reader).run();
+void check_consistency(const Experiment& experiment, const ConfigKeys& keys) {
+  Checks(experiment, keys).run();
 }
 
 }  // namespace softarm

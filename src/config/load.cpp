@@ -5,33 +5,21 @@
 #include <exception>
 
 #include "config/checks.hpp"
-#include "config/reader.hpp"
-#include "config/writer.hpp"
-#include "config/yaml_tree.hpp"
+#include "config/describe.hpp"
+#include "config/printers.hpp"
+#include "softarm/base/hash.hpp"
 #include "softarm/valves/register_map.hpp"
 
 namespace softarm {
 namespace {
 
-/// FNV-1a, 64 bits.
-std::uint64_t fnv1a(const std::string& text) {
-  std::uint64_t hash = 14695981039346656037ull;
-  for (const char c : text) {
-    hash ^= static_cast<unsigned char>(c);
-    hash *= 1099511628211ull;
-  }
-  return hash;
+/// One description reads and writes: what is printed is a copy.
+Entry entries_of(Experiment experiment, ConfigKeys::Purpose purpose) {
+  ConfigKeys keys(purpose);
+  return keys.visit([&] { describe(keys, experiment); });
 }
 
-std::string print(const Experiment& experiment, Documentation documentation) {
-  ExperimentWriter writer(documentation);
-  Experiment copy = experiment;  // one description reads and writes; printing changes nothing
-  describe_experiment(writer, copy);
-  return writer.text();
-}
-
-/// What the template shows where a key has no default: a short arm that goes through every kind of
-/// reference.
+/// The values of keys without a default in the template: a short arm with every kind of reference.
 Experiment example_experiment() {
   Experiment example;
   example.name = "my experiment";
@@ -60,13 +48,12 @@ Experiment example_experiment() {
 }
 
 Experiment read(const std::filesystem::path& file) {
-  const YamlNode root = read_yaml_file(file);
-  ExperimentReader reader(root);
+  ConfigKeys keys(file);
   Experiment experiment;
-  reader.read([&] { describe_experiment(reader, experiment); });
+  keys.visit([&] { describe(keys, experiment); });
   experiment.estimation.base_is_fixed = experiment.transport.bodies.base_id < 0;
   experiment.safety.deadman = !experiment.transport.lcm.deadman_channel.empty();
-  check_consistency(experiment, reader);
+  check_consistency(experiment, keys);
   experiment.hash = fnv1a(resolved_text(experiment));
   return experiment;
 }
@@ -84,20 +71,29 @@ Experiment load_experiment(const std::filesystem::path& file) {
 }
 
 std::string resolved_text(const Experiment& experiment) {
-  return print(experiment, Documentation::units);
+  return yaml_text(entries_of(experiment, ConfigKeys::Purpose::print), false);
 }
 
 std::string template_text() {
-  constexpr const char* kHeader =
-      R"(# Every key of an experiment, with its meaning, type, range and unit. Printed by `softarm check --template`.
+  constexpr const char* kHeader = R"(# yaml-language-server: $schema=experiment.schema.json
+# Every key of an experiment, with its meaning, type, range and unit. Printed by `softarm check --template`.
 #
-# A key that is not marked as required may be left out and then has the value shown here. Unknown and repeated keys,
-# wrong types and values out of range are refused. Angles are radians and may be written as multiples of pi:
-# pi/2, -pi, 3*pi/4, 0.2*pi/180. `include: FILE` (relative to this file) takes over what FILE says; what stands here
-# wins, key by key.
+# A key that is not marked as required may be left out and then has the value shown here, or that of its text. Unknown
+# and repeated keys, wrong types and values out of range are refused. Angles are radians and may be written as multiples
+# of pi: pi/2, -pi, 3*pi/4, 0.2*pi/180. `include: FILE` (relative to this file) takes over the keys of FILE; those
+# of this file win, key by key. Editors with a YAML language server complete and check a file whose first line names the
+# schema, as in this file: `softarm check --schema > experiment.schema.json`.
 
 )";
-  return kHeader + print(example_experiment(), Documentation::full);
+  return kHeader + yaml_text(entries_of(example_experiment(), ConfigKeys::Purpose::document), true);
+}
+
+std::string schema_text() {
+  Experiment example = example_experiment();
+  example.reference.phases.clear();
+  for (const ReferenceKind& kind : reference_kinds().all())
+    example.reference.phases.emplace_back().kind = kind;
+  return json_schema_text(entries_of(example, ConfigKeys::Purpose::schema));
 }
 
 std::string hash_text(std::uint64_t hash) { return fmt::format("{:016x}", hash); }

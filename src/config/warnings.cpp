@@ -1,41 +1,34 @@
-// What is allowed but probably not meant.
+// Warnings about settings that are allowed but probably not intended.
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 
 #include "softarm/actuation/pressure_allocator.hpp"
+#include "softarm/base/time.hpp"
 #include "softarm/config/load.hpp"
 #include "softarm/control/gain_check.hpp"
 #include "softarm/control/reference.hpp"
-#include "softarm/control/task_space_path.hpp"
 #include "softarm/model/actuation_matrix.hpp"
-#include "softarm/model/dynamics.hpp"
+#include "softarm/model/statics.hpp"
 #include "softarm/runtime/safety_monitor.hpp"
 #include "softarm/runtime/settings.hpp"
 
 namespace softarm {
 namespace {
 
-/// Can the chambers hold the poses of the reference, at rest, against stiffness and gravity?
+/// Checks whether the chambers can hold the poses of the reference at rest against stiffness and
+/// gravity.
 class StaticReach {
  public:
   explicit StaticReach(const Experiment& experiment)
-      : arm_(experiment.arm),
-        workspace_(experiment.arm),
-        allocator_(experiment.actuation),
-        zero_(Eigen::VectorXd::Zero(experiment.arm.dof())) {}
+      : arm_(experiment.arm), workspace_(experiment.arm), allocator_(experiment.actuation) {}
 
   /// The smallest part s of the torque that a segment's chambers give in this pose (2n, rad).
   double scale(const std::vector<double>& u_rad) {
     const Eigen::VectorXd u = Eigen::Map<const Eigen::VectorXd>(u_rad.data(), arm_.dof());
     Eigen::VectorXd force(arm_.dof());
-    const DynamicsTerms gravity_only = {.inertia = false, .coriolis = false, .gravity = true};
-    inverse_dynamics(arm_, workspace_, u, zero_, zero_, zero_, gravity_only, force);
-    for (int i = 0; i < arm_.size(); ++i) {
-      const double k = arm_.segments[static_cast<std::size_t>(i)].stiffness_nm_per_rad;
-      force.segment<2>(2 * i) += k * u.segment<2>(2 * i);
-    }
+    static_moments(arm_, workspace_, u, force);
     Eigen::VectorXd tau(arm_.dof());
     solve_actuation(arm_, u, force, tau);
     Allocation allocation;
@@ -45,11 +38,11 @@ class StaticReach {
 
   double scale(const ReferenceKind& kind) {
     double smallest = 1.0;
-    if (const auto* hold = std::get_if<SetPointReference>(&kind)) smallest = scale(hold->u_rad);
-    if (const auto* way = std::get_if<WayPointReference>(&kind)) {
+    if (const auto* hold = kind.get_if<SetPointReference>()) smallest = scale(hold->u_rad);
+    if (const auto* way = kind.get_if<WayPointReference>()) {
       for (const WayPoint& point : way->points) smallest = std::min(smallest, scale(point.u_rad));
     }
-    if (const auto* paper = std::get_if<PaperReference>(&kind)) smallest = scale(*paper);
+    if (const auto* paper = kind.get_if<PaperReference>()) smallest = scale(*paper);
     return smallest;
   }
 
@@ -75,17 +68,16 @@ class StaticReach {
   const ArmParameters& arm_;
   DynamicsWorkspace workspace_;
   PressureAllocator allocator_;
-  Eigen::VectorXd zero_;
 };
 
-/// What the configuration declares of the loop, whoever closes it.
+/// The control loop as the configuration declares it.
 LoopSampling sampling_of(const Experiment& experiment) {
   const SafetySettings& safety = experiment.safety;
   return {.control_period_s = 1.0 / experiment.rate_hz,
           .frame_period_s = safety.frame_period_s,
           .frame_latency_s = safety.frame_latency_s,
           .filter_bandwidth_radps = experiment.estimation.filter_bandwidth_radps,
-          .dead_time_s = experiment.control.delay_s,
+          .dead_time_s = experiment.control.dead_time_s,
           .valve_lag_s = experiment.control.valve_lag_s};
 }
 
@@ -108,9 +100,9 @@ std::vector<std::string> experiment_warnings(const Experiment& experiment) {
   double length_m = 0.0;
   for (const SegmentParameters& segment : experiment.arm.segments) length_m += segment.length_m;
   for (std::size_t i = 0; i < experiment.reference.phases.size(); ++i) {
-    const auto* path = std::get_if<TipPathReference>(&experiment.reference.phases[i].kind);
+    const auto* path = experiment.reference.phases[i].kind.get_if<TipPathReference>();
     if (path == nullptr) continue;
-    const double away_m = largest_distance_m(*path, experiment.arm.base_position_m);
+    const double away_m = path->largest_distance_m(experiment.arm.base_position_m);
     if (away_m > length_m) {
       warnings.push_back(fmt::format(
           "reference[{}]: the path goes {:.4g} m away from the base, the arm is {:.4g} m "
@@ -121,9 +113,18 @@ std::vector<std::string> experiment_warnings(const Experiment& experiment) {
 
   const SafetyThresholds thresholds =
       resolve_thresholds(experiment.safety, 1.0 / experiment.rate_hz);
+  const double unanswered_s =
+      (experiment.valves.tolerated_failures + 1) / experiment.valves.rate_hz;
+  if (experiment.safety.valve_readback && unanswered_s >= experiment.safety.valve_silence_s) {
+    warnings.push_back(fmt::format(
+        "valves.tolerated_failures: so many failures last {:.3g} s, daemon.safety.valve_silence_s "
+        "is {:.3g} s: the daemon goes to FAULT before softarm-valves has tolerated them",
+        unanswered_s, experiment.safety.valve_silence_s));
+  }
+
   const MocapSettings& mocap = experiment.plant.mocap;
   const double oldest_s = mocap.latency_s + 1.0 / mocap.rate_hz;
-  const double hold_s = 1e-9 * static_cast<double>(thresholds.hold_after_ns);
+  const double hold_s = to_seconds(thresholds.hold_after_ns);
   if (oldest_s > hold_s) {
     warnings.push_back(fmt::format(
         "plant.mocap: its frames get {:.3g} s old, daemon.safety holds after {:.3g} s: the "

@@ -31,7 +31,7 @@ std::string quoted_excerpt(const std::string& text) {
   return out + (text.size() > kLength ? "...\"" : "\"");
 }
 
-/// Builds the tree from the parser's events, so that nothing yaml-cpp would forgive gets past.
+/// Builds the tree from the parser's events, so that errors which yaml-cpp tolerates are found.
 class TreeBuilder : public YAML::EventHandler {
  public:
   explicit TreeBuilder(FileName file) : file_(std::move(file)) {}
@@ -147,7 +147,7 @@ class TreeBuilder : public YAML::EventHandler {
     Level& level = levels_.back();
     if (level.node.kind == YamlNode::Kind::map) {
       child.key_location = level.key_location;
-      // The parser notices that there is no value only where the next line starts.
+      // The parser notices a missing value only at the start of the next line.
       if (child.kind == YamlNode::Kind::nothing) child.location = level.key_location;
     }
     level.node.items.push_back(std::move(child));
@@ -176,15 +176,10 @@ std::string read_text(const std::filesystem::path& file) {
     throw ConfigError(file.string(), 0, "", "a configuration file", "a folder");
   }
   std::ifstream stream(file, std::ios::binary);
-  constexpr std::size_t kBlock = 16 * 1024;
-  std::string text;
-  while (stream && text.size() <= kMaxFileBytes) {
-    const std::size_t before = text.size();
-    text.resize(before + kBlock);
-    stream.read(text.data() + before, static_cast<std::streamsize>(kBlock));
-    text.resize(before + static_cast<std::size_t>(stream.gcount()));
-  }
-  if (!stream && !stream.eof()) {
+  std::string text(kMaxFileBytes + 1, '\0');
+  stream.read(text.data(), static_cast<std::streamsize>(text.size()));
+  text.resize(static_cast<std::size_t>(stream.gcount()));
+  if (!stream.is_open() || stream.bad()) {
     throw ConfigError(file.string(), 0, "", "a readable file", "no permission to read it");
   }
   if (text.size() > kMaxFileBytes) {

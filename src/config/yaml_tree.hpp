@@ -1,6 +1,5 @@
-// A YAML file as a plain tree that remembers where everything stood. Stricter than YAML: no
-// aliases, no tags, no duplicate keys, bounded depth and size; `include: FILE` at the top is merged
-// in.
+// A YAML file as a plain tree with the location of every node. Stricter than YAML: no aliases, no
+// tags, no duplicate keys, bounded depth and size; `include: FILE` at the top is merged in.
 #pragma once
 
 #include <filesystem>
@@ -9,12 +8,9 @@
 #include <string_view>
 #include <vector>
 
-namespace softarm {
+#include "softarm/config/config_keys.hpp"
 
-struct Location {
-  std::shared_ptr<const std::string> file;
-  int line = 0;  ///< 1-based
-};
+namespace softarm {
 
 struct YamlNode {
   enum class Kind { nothing, scalar, list, map };
@@ -28,12 +24,12 @@ struct YamlNode {
 
   /// The item at `key` of a map; nullptr where there is none.
   const YamlNode* find(std::string_view key) const;
-  /// What stands here, for messages: `"0.11"`, `a list of 3`, `nothing`.
+  /// The content, for messages: `"0.11"`, `a list of 3`, `nothing`.
   std::string describe() const;
 };
 
 /// Reads a file with everything it includes; values of the including file win, maps are merged key
-/// by key. The root is a map. @throws ConfigError and nothing else.
+/// by key. The root is a map. @throws ConfigError, no other exception
 YamlNode read_yaml_file(const std::filesystem::path& file);
 
 }  // namespace softarm

@@ -8,6 +8,9 @@
 
 namespace softarm {
 
+/// Of a minimum-jerk (quintic) motion over its mean speed.
+inline constexpr double kQuinticPeakSpeed = 1.875;
+
 /// d(t) = (1 - x)^3 (a + b x + c x^2), x = (t - begin) / duration: given d, d', d'' at x = 0; zero
 /// with its first two derivatives at x = 1 and after.
 class Blend {

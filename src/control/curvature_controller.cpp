@@ -87,6 +87,7 @@ CurvatureController::CurvatureController(const ArmParameters& arm,
       ki_(settings.ki.empty() ? SegmentVector::Zero(arm.dof())
                               : gains("ki", settings.ki, arm.dof())),
       integral_(SegmentVector::Zero(arm.dof())),
+      horizontal_(arm),
       integrates_(!ki_.isZero(0.0)) {
   if (!std::isfinite(settings.valve_lag_s) || settings.valve_lag_s < 0.0) {
     throw std::invalid_argument(
@@ -105,7 +106,9 @@ CurvatureController::CurvatureController(const ArmParameters& arm,
     if (settings.terms.stiffness) stiffness_[i] = segment.stiffness_nm_per_rad;
     if (settings.terms.damping) damping_[i] = segment.damping_nms_per_rad;
   }
-  for (SegmentVector* v : {&velocity_ref_, &acceleration_ref_, &before_, &after_}) v->setZero(dof);
+  for (SegmentVector* v :
+       {&velocity_ref_, &acceleration_ref_, &before_, &after_, &along_x_, &along_y_})
+    v->setZero(dof);
 }
 
 // Half the lag: where theta'' of the reference jumps (by J, (24) at t = 1 s) the difference spreads
@@ -114,7 +117,8 @@ CurvatureController::CurvatureController(const ArmParameters& arm,
 double CurvatureController::lookahead_s() const noexcept { return 0.5 * settings_.valve_lag_s; }
 
 void CurvatureController::compute(ConstVectorRef u, ConstVectorRef velocity,
-                                  const ReferenceWindow& reference, ControlOutput& out) noexcept {
+                                  const ReferenceWindow& reference, ControlOutput& out,
+                                  const ModelCorrection* correction) noexcept {
   out.tau_u_nm.resize(arm_.dof());
   out.tau_actuation_nm.resize(arm_.dof());
   out.bounded = false;
@@ -125,6 +129,8 @@ void CurvatureController::compute(ConstVectorRef u, ConstVectorRef velocity,
   }
   if (settings_.valve_lag_s > 0.0 && reference.interval_s > 0.0) add_lag_inverse(reference, out);
   if (integrates_) out.tau_u_nm += integral_;
+  if (correction != nullptr && settings_.disturbance != DisturbanceRejection::none)
+    correct(*correction, u, reference, out);
   solve_actuation(arm_, u, out.tau_u_nm, out.tau_actuation_nm);
   if (arm_.actuation == ActuationModel::couple) {
     for (Eigen::Index i = 0; i < u.size(); i += 2) {
@@ -206,6 +212,36 @@ void CurvatureController::add_lag_inverse(const ReferenceWindow& reference,
   feed_forward(reference.before, before_);
   feed_forward(reference.after, after_);
   out.tau_u_nm += settings_.valve_lag_s / reference.interval_s * (after_ - before_);
+}
+
+// What the corrected arm needs beyond the configured one to follow the reference from u.
+void CurvatureController::add_correction(const ModelCorrection& correction, ConstVectorRef u,
+                                         const ReferenceSample& r,
+                                         SegmentVector& force_nm) noexcept {
+  if (settings_.terms.gravity) horizontal_.rows(u, workspace_, along_x_, along_y_);
+  for (int i = 0; i < arm_.size(); ++i) {
+    const SegmentCorrection& off = correction.segment[static_cast<std::size_t>(i)];
+    const auto at = [i](const auto& v) { return v.template segment<2>(2 * i).array(); };
+    auto force = force_nm.segment<2>(2 * i).array();
+    force += off.stiffness * at(stiffness_) * at(r.u) + off.damping * at(damping_) * at(r.velocity);
+    if (settings_.terms.gravity) force += off.load.x() * at(along_x_) + off.load.y() * at(along_y_);
+  }
+}
+
+void CurvatureController::correct(const ModelCorrection& correction, ConstVectorRef u,
+                                  const ReferenceWindow& reference, ControlOutput& out) noexcept {
+  add_correction(correction, u, reference.now, out.tau_u_nm);
+  if (settings_.valve_lag_s > 0.0 && reference.interval_s > 0.0) {
+    before_.setZero();
+    after_.setZero();
+    add_correction(correction, reference.before.u, reference.before, before_);
+    add_correction(correction, reference.after.u, reference.after, after_);
+    out.tau_u_nm += settings_.valve_lag_s / reference.interval_s * (after_ - before_);
+  }
+  if (settings_.disturbance == DisturbanceRejection::cancel)
+    out.tau_u_nm -= correction.disturbance_nm;
+  for (int i = 0; i < arm_.size(); ++i)
+    out.tau_u_nm.segment<2>(2 * i) /= 1.0 + correction.segment[static_cast<std::size_t>(i)].gain;
 }
 
 }  // namespace softarm

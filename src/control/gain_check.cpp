@@ -12,6 +12,7 @@
 #include "control/sampled_loop.hpp"
 #include "softarm/model/dynamics.hpp"
 #include "softarm/model/kinematics.hpp"
+#include "softarm/model/statics.hpp"
 
 namespace softarm {
 namespace {
@@ -105,24 +106,6 @@ std::string explain(const LoopSampling& sampling, double kp, double factor,
 }
 
 }  // namespace
-
-Eigen::MatrixXd gravity_slope(const ArmParameters& arm, const Eigen::VectorXd& at) {
-  constexpr double kStep = 1e-4;
-  const int dof = arm.dof();
-  const DynamicsTerms gravity{false, false, true};
-  DynamicsWorkspace workspace(arm);
-  Eigen::MatrixXd slope(dof, dof);
-  Eigen::VectorXd u = at, zero = Eigen::VectorXd::Zero(dof), plus(dof), minus(dof);
-  for (int j = 0; j < dof; ++j) {
-    u[j] = at[j] + kStep;
-    inverse_dynamics(arm, workspace, u, zero, zero, zero, gravity, plus);
-    u[j] = at[j] - kStep;
-    inverse_dynamics(arm, workspace, u, zero, zero, zero, gravity, minus);
-    u[j] = at[j];
-    slope.col(j) = (plus - minus) / (2.0 * kStep);
-  }
-  return slope;
-}
 
 Eigen::Matrix3d tip_compliance(const ArmParameters& arm, const Eigen::VectorXd& u,
                                const Eigen::VectorXd& kp_u, bool gravity_fed_back) {

@@ -8,16 +8,13 @@
 #include <stdexcept>
 
 #include "control/blend.hpp"
-#include "control/reference_curves.hpp"
 #include "control/soft_limit.hpp"
 #include "control/task_space_tracker.hpp"
-#include "softarm/control/task_space_path.hpp"
 #include "softarm/model/kinematics.hpp"
 
 namespace softarm {
 namespace {
 
-constexpr double kQuinticPeakSpeed = 1.875;
 constexpr double kShortestLive = 0.05;  ///< s, for a live reference that is corrected a little
 
 double largest_norm(const SegmentVector& v) noexcept {
@@ -37,7 +34,28 @@ void resize(ReferenceSample& sample, int dof) noexcept {
   sample.has_tip = false;
 }
 
+void check_phase(int phase, const ReferenceKind& kind, const ControllerSettings& control,
+                 int segments) {
+  const ReferencePlace place{phase};
+  kind.check(place, control, segments);
+  place.require(kind.largest_theta_rad() <= control.max_theta_rad,
+                fmt::format("theta within control.max_theta_rad ({} rad)", control.max_theta_rad),
+                fmt::format("up to {:.6g} rad", kind.largest_theta_rad()));
+  place.require(
+      kind.largest_speed_radps() <= control.max_speed_radps,
+      fmt::format("speeds within control.max_speed_radps ({} rad/s)", control.max_speed_radps),
+      fmt::format("up to {:.4g} rad/s; give it more time", kind.largest_speed_radps()));
+}
+
 }  // namespace
+
+double largest_theta_rad(const ReferenceSettings& settings) noexcept {
+  double theta = 0.0;
+  for (const ReferencePhase& phase : settings.phases) {
+    theta = std::max(theta, phase.kind.largest_theta_rad());
+  }
+  return theta;
+}
 
 struct Reference::State {
   /// The latest message of a live phase; its times count from the beginning of the phase.
@@ -49,6 +67,8 @@ struct Reference::State {
   };
   struct Phase {
     ReferenceKind kind;
+    bool live = false;
+    double timeout_s = 0.0;  ///< of a live phase
     double begin_s = 0.0;
     double peak_speed_radps = 0.0;
     Blend join;
@@ -93,26 +113,14 @@ void Reference::State::curve(const Phase& phase, double time_s,
                              ReferenceSample& out) const noexcept {
   resize(out, dof);
   if (phase.tracker) return phase.tracker->sample(phase.begin_s + time_s, out);
-  const auto* live = std::get_if<LiveReference>(&phase.kind);
-  if (live == nullptr) {
-    std::visit(
-        [&](const auto& kind) {
-          using Kind = std::decay_t<decltype(kind)>;
-          if constexpr (!std::is_same_v<Kind, LiveReference> &&
-                        !std::is_same_v<Kind, TipPathReference>) {
-            evaluate(kind, time_s, out);
-          }
-        },
-        phase.kind);
-    return;
-  }
+  if (!phase.live) return phase.kind.evaluate(time_s, out);
   const Message& message = phase.message;
   const double age = std::max(time_s - message.time_s, 0.0);
   out.u = message.u;
   out.velocity.setZero();
   out.acceleration.setZero();
   if (!message.received) return;
-  if (age < live->timeout_s) {
+  if (age < phase.timeout_s) {
     out.u += age * message.velocity + 0.5 * age * age * message.acceleration;
     out.velocity = message.velocity + age * message.acceleration;
     out.acceleration = message.acceleration;
@@ -146,7 +154,7 @@ void Reference::State::join(int index) noexcept {
         tip_seen ? (tip_m - tip_position(arm, offset)).eval() : Eigen::Vector3d::Zero();
     return phase.tracker->start(phase.begin_s, from.u, from.velocity, off);
   }
-  if (std::holds_alternative<LiveReference>(phase.kind)) {
+  if (phase.live) {
     phase.message.received = false;
     phase.message.u = from.u;
     phase.message.time_s = 0.0;
@@ -192,7 +200,7 @@ void Reference::State::join_message(Phase& phase, double time_s) noexcept {
   message.u = to.u;
   message.velocity = to.velocity;
   message.acceleration = to.acceleration;
-  const double timeout = std::get<LiveReference>(phase.kind).timeout_s;
+  const double timeout = phase.timeout_s;
   offset = timeout * to.velocity + 0.5 * timeout * timeout * to.acceleration;
   offset_rate = to.velocity + timeout * to.acceleration;
   message.rest.set(time_s + timeout, blend_duration(offset, 0.0), offset, offset_rate,
@@ -203,7 +211,7 @@ Reference::Reference(const ReferenceSettings& settings, const ControllerSettings
                      int segments)
     : Reference(settings, control, [&] {
         for (const ReferencePhase& phase : settings.phases) {
-          if (std::holds_alternative<TipPathReference>(phase.kind)) {
+          if (phase.kind.is_tip_path()) {
             throw std::invalid_argument(
                 "reference: expected an arm for a path of the tip, got none");
           }
@@ -237,25 +245,26 @@ Reference::Reference(const ReferenceSettings& settings, const ControllerSettings
   double begin = 0.0;
   for (std::size_t i = 0; i < settings.phases.size(); ++i) {
     const ReferencePhase& phase = settings.phases[i];
-    const std::string where = fmt::format("reference, phase {}", i + 1);
-    check_phase(where, phase.kind, control, segments);
+    check_phase(static_cast<int>(i), phase.kind, control, segments);
     const bool last = i + 1 == settings.phases.size();
     if (!last && !(std::isfinite(phase.duration_s) && phase.duration_s > 0.0)) {
-      throw std::invalid_argument(
-          fmt::format("{}: expected a duration (s) > 0, got {}", where, phase.duration_s));
+      throw ReferenceError(static_cast<int>(i), ".duration_s", "a duration (s) > 0",
+                           fmt::format("{}", phase.duration_s));
     }
     State::Phase made;
     made.kind = phase.kind;
     made.begin_s = begin;
-    made.peak_speed_radps = largest_speed_radps(phase.kind);
+    if (const auto* live = phase.kind.get_if<LiveReference>()) {
+      made.live = true;
+      made.timeout_s = live->timeout_s;
+    }
+    made.peak_speed_radps = phase.kind.largest_speed_radps();
     made.join.resize(state_->dof);
     made.message.u.setZero(state_->dof);
     made.message.velocity.setZero(state_->dof);
     made.message.acceleration.setZero(state_->dof);
     made.message.rest.resize(state_->dof);
-    if (const auto* path = std::get_if<TipPathReference>(&phase.kind)) {
-      made.tracker.emplace(arm, control, *path);
-    }
+    if (phase.kind.is_tip_path()) made.tracker.emplace(arm, control, phase.kind);
     state_->phases.push_back(std::move(made));
     begin += phase.duration_s;
   }
@@ -348,8 +357,7 @@ LiveVerdict Reference::receive(double time_s, ConstVectorRef u, ConstVectorRef v
   int index;
   s.at(time, index);
   State::Phase& phase = s.phases[static_cast<std::size_t>(index)];
-  const auto* live = std::get_if<LiveReference>(&phase.kind);
-  if (!s.started || time < 0.0 || live == nullptr) return LiveVerdict::not_live;
+  if (!s.started || time < 0.0 || !phase.live) return LiveVerdict::not_live;
   if (u.size() != s.dof || velocity.size() != s.dof || acceleration.size() != s.dof) {
     return LiveVerdict::wrong_size;
   }
@@ -360,7 +368,7 @@ LiveVerdict Reference::receive(double time_s, ConstVectorRef u, ConstVectorRef v
   s.to.u = u;
   s.to.velocity = velocity;
   s.to.acceleration = acceleration;
-  s.offset_rate = velocity + live->timeout_s * acceleration;
+  s.offset_rate = velocity + phase.timeout_s * acceleration;
   const double max_speed = s.control.max_speed_radps;
   if (largest_norm(s.to.u) > s.control.max_theta_rad || largest_norm(s.to.velocity) > max_speed ||
       largest_norm(s.offset_rate) > max_speed) {

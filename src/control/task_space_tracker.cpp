@@ -6,7 +6,6 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "softarm/control/task_space_path.hpp"
 #include "softarm/model/kinematics.hpp"
 
 namespace softarm {
@@ -28,7 +27,7 @@ void require_positive(const char* name, double value) {
 }  // namespace
 
 TaskSpaceTracker::TaskSpaceTracker(const ArmParameters& arm, const ControllerSettings& control,
-                                   const TipPathReference& path)
+                                   const ReferenceKind& path)
     : arm_(arm),
       gains_(control.task_space),
       path_(path),
@@ -59,7 +58,7 @@ void TaskSpaceTracker::start(double time_s, ConstVectorRef u, ConstVectorRef vel
   offset_m_ = tip_offset_m;
   offset_rate_mps_.setZero();
   limited_ = false;
-  const TipReference first = evaluate(path_, 0.0);
+  const TipReference first = path_.tip(0.0);
   tip_jacobian(arm_, u_, jacobian_);
   const SegmentVector away = tip_position(arm_, u_) + offset_m_ - first.position_m;
   const SegmentVector rate = jacobian_ * velocity_ - first.velocity_mps;
@@ -99,7 +98,7 @@ void TaskSpaceTracker::sample(double time_s, ReferenceSample& out) const noexcep
   out.has_polar = false;
   out.limited = limited_;
   out.has_tip = true;
-  out.tip = evaluate(path_, std::max(time_s - begin_s_, 0.0));
+  out.tip = path_.tip(std::max(time_s - begin_s_, 0.0));
 }
 
 void TaskSpaceTracker::step(double duration_s) noexcept {
@@ -156,7 +155,7 @@ void TaskSpaceTracker::bound(double duration_s) noexcept {
 
 // The path, joined from where the tip was at the start.
 TipReference TaskSpaceTracker::target(double time_s) noexcept {
-  TipReference out = evaluate(path_, time_s - begin_s_);
+  TipReference out = path_.tip(time_s - begin_s_);
   if (!join_.active(time_s)) return out;
   blended_.u = out.position_m;
   blended_.velocity = out.velocity_mps;

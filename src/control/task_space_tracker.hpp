@@ -28,7 +28,7 @@ namespace softarm {
 class TaskSpaceTracker {
  public:
   TaskSpaceTracker(const ArmParameters& arm, const ControllerSettings& control,
-                   const TipPathReference& path);
+                   const ReferenceKind& path);
 
   /// From u, velocity (2n) at `time_s`, where the path begins. The path is joined from where the
   /// tip is by a quintic in blend_s. @param tip_offset_m d there.
@@ -59,7 +59,7 @@ class TaskSpaceTracker {
 
   ArmParameters arm_;
   TaskSpaceSettings gains_;
-  TipPathReference path_;
+  ReferenceKind path_;
   double blend_s_, max_theta_rad_, max_speed_radps_, reach_m_;
 
   double begin_s_ = 0.0, time_s_ = 0.0;

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "softarm/base/time.hpp"
+
 namespace softarm {
 namespace {
 
@@ -20,6 +22,14 @@ constexpr std::uint64_t kMaxCountedGap = 1'000'000;
 // A jump must exceed what noise explains: standard deviations of the difference of two
 // measurements.
 constexpr double kNoiseMargin = 8.0;
+
+/// Of every FrameVerdict, in its order.
+constexpr std::int64_t FrameCounters::*kCounters[] = {
+    &FrameCounters::accepted,       &FrameCounters::repeated,   &FrameCounters::out_of_order,
+    &FrameCounters::restarted,      &FrameCounters::wrong_size, &FrameCounters::not_finite,
+    &FrameCounters::bad_quaternion, &FrameCounters::bad_length, &FrameCounters::jump,
+    &FrameCounters::not_seen};
+static_assert(std::size(kCounters) == static_cast<std::size_t>(FrameVerdict::not_seen) + 1);
 
 bool finite(const BodyPose& body) {
   return body.position_m.allFinite() && body.orientation.coeffs().allFinite();
@@ -38,32 +48,6 @@ void require_positive(double value, const char* name) {
 }
 
 }  // namespace
-
-const char* verdict_name(FrameVerdict verdict) noexcept {
-  switch (verdict) {
-    case FrameVerdict::accepted:
-      return "accepted";
-    case FrameVerdict::repeated:
-      return "repeated";
-    case FrameVerdict::out_of_order:
-      return "out_of_order";
-    case FrameVerdict::sender_restarted:
-      return "sender_restarted";
-    case FrameVerdict::wrong_size:
-      return "wrong_size";
-    case FrameVerdict::not_finite:
-      return "not_finite";
-    case FrameVerdict::bad_quaternion:
-      return "bad_quaternion";
-    case FrameVerdict::bad_length:
-      return "bad_length";
-    case FrameVerdict::jump:
-      return "jump";
-    case FrameVerdict::not_seen:
-      return "not_seen";
-  }
-  return "unknown";
-}
 
 FrameValidator::FrameValidator(const EstimationSettings& settings, const ArmParameters& arm,
                                std::span<const BodyNoise> noise)
@@ -85,41 +69,12 @@ void FrameValidator::reset() noexcept {
 
 FrameVerdict FrameValidator::accept(const MocapFrame& frame) noexcept {
   const FrameVerdict verdict = judge(frame);
-  switch (verdict) {
-    case FrameVerdict::accepted:
-      ++counters_.accepted;
-      remember(frame);
-      break;
-    case FrameVerdict::sender_restarted:
-      ++counters_.restarted;
-      reset();
-      has_number_ = true;
-      last_number_ = frame.frame_number;
-      break;
-    case FrameVerdict::repeated:
-      ++counters_.repeated;
-      break;
-    case FrameVerdict::out_of_order:
-      ++counters_.out_of_order;
-      break;
-    case FrameVerdict::wrong_size:
-      ++counters_.wrong_size;
-      break;
-    case FrameVerdict::not_finite:
-      ++counters_.not_finite;
-      break;
-    case FrameVerdict::bad_quaternion:
-      ++counters_.bad_quaternion;
-      break;
-    case FrameVerdict::bad_length:
-      ++counters_.bad_length;
-      break;
-    case FrameVerdict::jump:
-      ++counters_.jump;
-      break;
-    case FrameVerdict::not_seen:
-      ++counters_.not_seen;
-      break;
+  ++(counters_.*kCounters[static_cast<std::size_t>(verdict)]);
+  if (verdict == FrameVerdict::accepted) remember(frame);
+  if (verdict == FrameVerdict::sender_restarted) {
+    reset();
+    has_number_ = true;
+    last_number_ = frame.frame_number;
   }
   return verdict;
 }
@@ -186,7 +141,7 @@ FrameVerdict FrameValidator::judge_segments(const MocapFrame& frame) noexcept {
       return FrameVerdict::bad_length;
     }
     if (!seen_[i]) continue;
-    const double passed_s = 1e-9 * static_cast<double>(frame.capture_ns - seen_ns_[i]);
+    const double passed_s = to_seconds(frame.capture_ns - seen_ns_[i]);
     const double noise = std::sqrt(candidate_.variance_rad2[i] + seen_variance_rad2_[i]);
     const Eigen::Vector2d u = candidate_.u_rad.segment<2>(2 * static_cast<Eigen::Index>(i));
     jumped = jumped || !((u - seen_u_rad_[i]).norm() <=

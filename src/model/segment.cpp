@@ -41,11 +41,6 @@ Eigen::Vector3d segment_point(double length_m, const Eigen::Vector2d& u_rad,
   return segment_tip(arc_fraction * length_m, arc_fraction * u_rad);
 }
 
-Columns segment_tip_jacobian(double length_m, const Eigen::Vector2d& u_rad) noexcept {
-  const auto c = entire<8>(u_rad.squaredNorm());
-  return to_columns(columns(tip_curve(length_m, c), u_rad.x(), u_rad.y()));
-}
-
 Columns segment_angular_jacobian(const Eigen::Vector2d& u_rad) noexcept {
   const auto c = entire<8>(u_rad.squaredNorm());
   return to_columns(columns(spin(c), u_rad.x(), u_rad.y()));

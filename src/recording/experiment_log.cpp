@@ -4,9 +4,9 @@
 
 #include <fstream>
 #include <iterator>
+#include <nlohmann/json.hpp>
 #include <stdexcept>
 
-#include "softarm/base/json_writer.hpp"
 #include "softarm/base/version.hpp"
 
 namespace softarm {
@@ -64,7 +64,7 @@ void ExperimentLog::add(const LogRow& row) {
     for (const SegmentVector* v :
          {&row.u, &row.velocity, &row.reference, &row.truth, &row.tau_actuation})
       pair(*v, i);
-    single(row.residual_twist, i);
+    single(row.residual_torsion, i);
     single(row.residual_length, i);
   }
   for (int j = 0; j < chambers_; ++j) {
@@ -86,35 +86,19 @@ void ExperimentLog::close() {
 }
 
 std::string timing_json(const TimingReport& report) {
-  JsonWriter json;
-  json.open_object();
-  json.member("real_time_factor", report.real_time_factor);
+  using Json = nlohmann::ordered_json;
+  std::vector<double> edges_us;
+  for (int k = 0; k < kDurationBuckets; ++k) edges_us.push_back(bucket_edge_us(k));
+  Json json{{"real_time_factor", report.real_time_factor}};
+  Json histograms = Json::object();
   for (const auto& each : report.histograms) {
-    json.key(each.name);
-    json.open_object();
-    json.member("p50", quantile_us(each.counts, 0.5));
-    json.member("p99", quantile_us(each.counts, 0.99));
-    json.member("max", each.max_us);
-    json.close_object();
+    json[each.name] = {{"p50", quantile_us(each.counts, 0.5)},
+                       {"p99", quantile_us(each.counts, 0.99)},
+                       {"max", each.max_us}};
+    histograms[each.name] = {{"edges_us", edges_us}, {"counts", each.counts}};
   }
-  json.key("histograms");
-  json.open_object();
-  for (const auto& each : report.histograms) {
-    json.key(each.name);
-    json.open_object();
-    json.key("edges_us");
-    json.open_array();
-    for (int k = 0; k < kDurationBuckets; ++k) json.value(bucket_edge_us(k));
-    json.close_array();
-    json.key("counts");
-    json.open_array();
-    for (const std::int64_t count : each.counts) json.value(count);
-    json.close_array();
-    json.close_object();
-  }
-  json.close_object();
-  json.close_object();
-  return json.text() + "\n";
+  json["histograms"] = std::move(histograms);
+  return json.dump() + "\n";
 }
 
 void write_text(const std::filesystem::path& path, const std::string& text) {

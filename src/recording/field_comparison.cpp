@@ -101,8 +101,8 @@ class Collector {
 
 }  // namespace
 
-// The structured bindings below name every member, so that a new one stops the build: it belongs
-// into the comparison.
+// The structured bindings below name every member, so that a new one breaks the build: it must be
+// added to the comparison.
 
 std::vector<FieldDifference> differences(const pressure_command_t& recorded,
                                          const pressure_command_t& replayed) {
@@ -164,7 +164,8 @@ std::vector<FieldDifference> differences(const controller_status_t& recorded,
   compare("residual_twist_rad", "rad", twist_a, twist_b);
   compare("residual_length_m", "m", length_a, length_b);
   compare("pressure_bar", "bar", pressure_a, pressure_b);
-  // Of the daemon, not of the tick: hash_, seed_, version_, overruns_ and malformed_ are its own.
+  // Not compared: hash_, seed_, version_, overruns_ and malformed_ belong to the daemon, not the
+  // tick.
   static_cast<void>(hash_a == hash_b && seed_a == seed_b && version_a == version_b);
   static_cast<void>(overruns_a == overruns_b && malformed_a == malformed_b);
   return std::move(compare.found);

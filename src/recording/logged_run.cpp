@@ -5,26 +5,20 @@
 #include <stdexcept>
 
 #include "softarm/base/clock.hpp"
+#include "softarm/base/time.hpp"
 #include "softarm/runtime/log_row.hpp"
 #include "softarm/simulation/lock_step.hpp"
 
 namespace softarm {
-namespace {
-constexpr std::int64_t kLatestTime_us = 4'000'000'000'000'000;  // nanoseconds must not overflow
-}  // namespace
 
 LoggedRun::LoggedRun(const Experiment& experiment, const std::filesystem::path& log)
     : experiment_(experiment),
       pipeline_(experiment),
       mocap_(experiment.transport, experiment.safety, experiment.arm),
-      file_(log, std::ios::binary),
-      log_(file_) {
-  if (!file_)
-    throw std::runtime_error(fmt::format(
-        "cannot read {}: is it an LCM log (softarm import, lcm-logger)?", log.string()));
+      log_(log) {
   if (!read_frame())
     throw std::runtime_error(fmt::format(
-        "{} holds no frame on channel {}; daemon.lcm.mocap_channel says which to look for",
+        "{} holds no frame on channel {}; daemon.lcm.mocap_channel is the channel to look for",
         log.string(), mocap_.channels().front()));
   start_ns_ = next_arrival_ns_;
 }
@@ -33,12 +27,13 @@ bool LoggedRun::read_frame() {
   for (LogEvent event; log_.next(event);) {
     const auto channel = mocap_.find(event.channel);
     if (!channel) continue;
-    if (event.time_us < 0 || event.time_us >= kLatestTime_us) {
+    const auto arrival_ns = event.arrival_ns();
+    if (!arrival_ns) {
       ++malformed_;
       continue;
     }
-    // A log written from several sources may step back a little; time here does not.
-    next_arrival_ns_ = std::max(next_arrival_ns_, event.time_us * 1000);
+    // The times of a log from several sources may step back a little; our time does not.
+    next_arrival_ns_ = std::max(next_arrival_ns_, *arrival_ns);
     const MocapReceipt receipt = mocap_.take(*channel, event.data, next_arrival_ns_, next_);
     if (receipt == MocapReceipt::malformed) ++malformed_;
     if (receipt == MocapReceipt::frame) return has_next_ = true;
@@ -57,14 +52,14 @@ bool LoggedRun::step(LogRow& row, bool logged) {
   TickInput input;
   input.now_ns = now_ns;
   input.frames = frames_;
-  input.newest_measurement_ns = now_ns;  // of valves that are not there
+  input.newest_measurement_ns = now_ns;  // as if valves were present
   operator_.attend(pipeline_.output(), input);
   const std::int64_t before_ns = monotonic_now_ns();
   pipeline_.tick(input);
   tick_times_.add_ns(monotonic_now_ns() - before_ns);
   if (!logged) return true;
   fill_from_pipeline(pipeline_, experiment_.arm, row);
-  row.t_s = 1e-9 * static_cast<double>(now_ns - start_ns_);
+  row.t_s = to_seconds(now_ns - start_ns_);
   row.truth.resize(0);
   row.real.resize(0);
   row.tip.reset();

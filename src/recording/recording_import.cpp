@@ -5,14 +5,16 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <lcm/lcm-cpp.hpp>
 #include <optional>
 #include <softarm_messages/mocap_frame_t.hpp>
 #include <softarm_messages/pressure_command_t.hpp>
 #include <softarm_messages/pressure_measurement_t.hpp>
 #include <stdexcept>
 
+#include "softarm/estimation/pose_statistics.hpp"
 #include "softarm/runtime/settings.hpp"
+#include "softarm/transport/event_log.hpp"
+#include "softarm/transport/pose_convention.hpp"
 #include "softarm/transport/settings.hpp"
 
 namespace softarm {
@@ -20,41 +22,25 @@ namespace {
 
 constexpr double kMostRestSpread_m = 2e-3;  ///< an arm that moves more is not at rest
 
-struct Pose {
-  Eigen::Vector3d position_m;
-  Eigen::Quaterniond orientation;
-
-  Pose operator*(const Pose& inner) const {
-    return {position_m + orientation * inner.position_m, orientation * inner.orientation};
-  }
-  Pose inverse() const {
-    const Eigen::Quaterniond back = orientation.conjugate();
-    return {-(back * position_m), back};
-  }
-};
-
-/// The turn that brings the recording's up axis to +z; right-handed axes stay right-handed.
-Eigen::Quaterniond to_z_up(UpAxis up) {
-  const Eigen::Vector3d axis = up == UpAxis::x   ? Eigen::Vector3d::UnitX()
-                               : up == UpAxis::y ? Eigen::Vector3d::UnitY()
-                                                 : Eigen::Vector3d::UnitZ();
-  return Eigen::Quaterniond::FromTwoVectors(axis, Eigen::Vector3d::UnitZ());
+/// The rotation of the recording's axes to ours, z up; right-handed axes stay right-handed.
+Eigen::Matrix3d to_z_up(UpAxis up) {
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
+  if (up == UpAxis::x) rotation << 0, 0, -1, 0, 1, 0, 1, 0, 0;
+  if (up == UpAxis::y) rotation << 1, 0, 0, 0, 0, -1, 0, 1, 0;
+  return rotation;
 }
 
-/// One row's body in the world with z up; nothing where it was not seen: all zero, or no number.
-std::optional<Pose> body_in(const CsvTable& table, std::size_t row, const BodyColumns& body,
-                            const RecordingMap& map, const Eigen::Quaterniond& z_up) {
-  Eigen::Vector3d p;
-  Eigen::Vector4d q;
-  for (std::size_t i = 0; i < 3; ++i) {
-    p[static_cast<Eigen::Index>(i)] = table.at(row, body.position[i]);
-  }
-  for (std::size_t i = 0; i < 4; ++i) {
-    q[static_cast<Eigen::Index>(i)] = table.at(row, body.orientation[i]);
-  }
-  if (!p.allFinite() || !q.allFinite() || q.isZero(0.0)) return {};
-  // The norm is kept: whether a quaternion is believed is for the validator to say.
-  return Pose{map.position_unit_m * (z_up * p), z_up * Eigen::Quaterniond(q)};
+/// The body of one row as given in the table; not valid where it was not seen (all zero, or not a
+/// number). The norm of the quaternion is kept: the validator decides whether to accept it.
+BodyPose body_in(const CsvTable& table, std::size_t row, const BodyColumns& body) {
+  BodyPose pose;
+  for (std::size_t i = 0; i < 3; ++i)
+    pose.position_m[static_cast<Eigen::Index>(i)] = table.at(row, body.position[i]);
+  for (std::size_t i = 0; i < 4; ++i)
+    pose.orientation.coeffs()[static_cast<Eigen::Index>(i)] = table.at(row, body.orientation[i]);
+  pose.valid = pose.position_m.allFinite() && pose.orientation.coeffs().allFinite() &&
+               !pose.orientation.coeffs().isZero(0.0);
+  return pose;
 }
 
 bool same_poses(const CsvTable& table, const RecordingMap& map, std::size_t a, std::size_t b) {
@@ -71,27 +57,21 @@ bool same_poses(const CsvTable& table, const RecordingMap& map, std::size_t a, s
 class Importer {
  public:
   explicit Importer(const MappedTable& recording)
-      : map_(recording.map), table_(recording.table), z_up_(to_z_up(map_.up)) {
+      : map_(recording.map),
+        table_(recording.table),
+        convention_(map_.bodies.size(), convention(Eigen::Isometry3d::Identity())) {
     check_times();
-    plates_.assign(map_.bodies.size(),
-                   Pose{Eigen::Vector3d::Zero(), Eigen::Quaterniond::Identity()});
-    if (map_.rest) learn_plates();
+    if (map_.rest) learn_rest();
   }
 
   ImportSummary write(const std::filesystem::path& out) {
-    lcm::LogFile log(out.string(), "w");
-    if (!log.good()) {
-      throw std::runtime_error(
-          fmt::format("{}: expected a file that can be written", out.string()));
-    }
+    EventLogWriter log(out);
     for (std::size_t row = 0; row < table_.rows(); ++row) {
       if (!map_.measured.empty()) append(log, map_.measurement_channel, row, measurement(row));
       if (!map_.commanded.empty()) append(log, map_.command_channel, row, command(row));
       append(log, map_.mocap_channel, row, frame(row));
     }
-    if (std::fflush(log.getFilePtr()) != 0) {
-      throw std::runtime_error(fmt::format("{}: could not be written", out.string()));
-    }
+    log.close();
     summary_.rows = static_cast<std::int64_t>(table_.rows());
     summary_.duration_s = time_s(table_.rows() - 1) - time_s(0);
     return summary_;
@@ -107,7 +87,7 @@ class Importer {
     for (std::size_t row = 0; row < table_.rows(); ++row) {
       const double t = time_s(row);
       const bool advances = row == 0 || t > time_s(row - 1);
-      // LCM's logs begin at 0 and the daemon's clocks know 64-bit nanoseconds.
+      // LCM logs begin at 0, and the daemon's clocks are 64-bit nanoseconds.
       if (!(t >= 0.0 && t < 4e9) || !advances) {
         throw std::runtime_error(
             fmt::format("{}:{}: {}: expected a time in [0, 4e9) s after that of "
@@ -117,15 +97,23 @@ class Importer {
     }
   }
 
-  /// Means over the window of rest, then what leads from every body to the frame of a straight arm
-  /// below the base.
-  void learn_plates() {
+  PoseConvention convention(const Eigen::Isometry3d& on_body) const {
+    const Eigen::Quaterniond orientation(on_body.linear());
+    return {map_.position_unit_m, to_z_up(map_.up), {on_body.translation(), orientation, true}};
+  }
+
+  BodyPose pose(std::size_t row, std::size_t body) const {
+    return convention_[body].to_world(body_in(table_, row, map_.bodies[body]));
+  }
+
+  /// Rows of the rest window in which every body was seen, without those that repeat a frame.
+  std::vector<std::size_t> rest_rows() const {
     std::vector<std::size_t> rows;
     for (std::size_t row = 0; row < table_.rows(); ++row) {
       const bool inside = time_s(row) >= map_.rest->from_s && time_s(row) <= map_.rest->to_s;
       const bool repeated = row > 0 && same_poses(table_, map_, row - 1, row);
       const bool seen = std::all_of(map_.bodies.begin(), map_.bodies.end(), [&](const auto& body) {
-        return body_in(table_, row, body, map_, z_up_).has_value();
+        return body_in(table_, row, body).valid;
       });
       if (inside && seen && !repeated) rows.push_back(row);
     }
@@ -135,30 +123,33 @@ class Importer {
                       "rest, {} to {} s, got none",
                       table_.file, map_.rest->from_s, map_.rest->to_s));
     }
-    summary_.rest_frames = static_cast<std::int64_t>(rows.size());
-    Pose straight{Eigen::Vector3d::Zero(), Eigen::Quaterniond(map_.base_rotation)};
-    for (std::size_t i = 0; i < map_.bodies.size(); ++i) {
-      const Pose mean = mean_pose(map_.bodies[i], rows);
-      if (i == 0) straight.position_m = mean.position_m;
-      straight.position_m +=
-          straight.orientation * (map_.bodies[i].length_m * Eigen::Vector3d::UnitZ());
-      plates_[i] = mean.inverse() * straight;
-    }
+    return rows;
   }
 
-  Pose mean_pose(const BodyColumns& body, const std::vector<std::size_t>& rows) {
-    Eigen::Vector3d position = Eigen::Vector3d::Zero();
-    Eigen::Vector4d orientation = Eigen::Vector4d::Zero();
+  /// The segment frames of an arm that hangs straight at rest, relative to the bodies.
+  void learn_rest() {
+    const std::vector<std::size_t> rows = rest_rows();
+    summary_.rest_frames = static_cast<std::int64_t>(rows.size());
+    std::vector<Eigen::Isometry3d> mean;
+    for (std::size_t i = 0; i < map_.bodies.size(); ++i) mean.push_back(mean_pose(i, rows));
+    ArmParameters arm;
+    arm.base_position_m = mean[0].translation();
+    arm.base_rotation = map_.base_rotation;
+    for (std::size_t i = 1; i < map_.bodies.size(); ++i)
+      arm.segments.push_back({.length_m = map_.bodies[i].length_m});
+    const auto frames = frames_on_bodies(arm, Eigen::VectorXd::Zero(arm.dof()), mean);
+    for (std::size_t i = 0; i < frames.size(); ++i) convention_[i] = convention(frames[i]);
+  }
+
+  Eigen::Isometry3d mean_pose(std::size_t body, const std::vector<std::size_t>& rows) {
+    MeanPose mean;
     for (const std::size_t row : rows) {
-      const Pose pose = *body_in(table_, row, body, map_, z_up_);
-      const Eigen::Vector4d q = pose.orientation.normalized().coeffs();
-      position += pose.position_m / static_cast<double>(rows.size());
-      orientation += orientation.dot(q) < 0.0 ? -q : q;  // q and -q are the same orientation
+      const BodyPose seen = pose(row, body);
+      mean.add(seen.position_m, seen.orientation);
     }
-    for (const std::size_t row : rows) {
-      const double away = (body_in(table_, row, body, map_, z_up_)->position_m - position).norm();
-      summary_.rest_spread_m = std::max(summary_.rest_spread_m, away);
-    }
+    for (const std::size_t row : rows)
+      summary_.rest_spread_m =
+          std::max(summary_.rest_spread_m, (pose(row, body).position_m - mean.position_m()).norm());
     if (summary_.rest_spread_m > kMostRestSpread_m)
       throw std::runtime_error(
           fmt::format("the arm moves by {:.1f} mm in the rest window of {} to {} s: expected less "
@@ -166,7 +157,7 @@ class Importer {
                       "give rest.from_s and rest.to_s a window in which it hangs still",
                       1e3 * summary_.rest_spread_m, map_.rest->from_s, map_.rest->to_s,
                       1e3 * kMostRestSpread_m));
-    return {position, Eigen::Quaterniond(Eigen::Vector4d(orientation.normalized()))};
+    return mean.pose();
   }
 
   softarm_messages::mocap_frame_t frame(std::size_t row) {
@@ -197,19 +188,18 @@ class Importer {
     frame_.num_bodies = static_cast<std::int16_t>(map_.bodies.size());
     bool all_seen = true;
     for (std::size_t i = 0; i < map_.bodies.size(); ++i) {
-      auto pose = body_in(table_, row, map_.bodies[i], map_, z_up_);
-      all_seen = all_seen && pose.has_value();
+      const BodyPose seen = pose(row, i);
+      all_seen = all_seen && seen.valid;
       auto& body = frame_.bodies[i];
       body = {};
       body.id = map_.bodies[i].id;
-      body.valid = pose ? 1 : 0;
-      if (!pose) continue;
-      *pose = *pose * plates_[i];
-      for (int axis = 0; axis < 3; ++axis) body.position_m[axis] = pose->position_m[axis];
-      body.orientation[0] = pose->orientation.w();
-      body.orientation[1] = pose->orientation.x();
-      body.orientation[2] = pose->orientation.y();
-      body.orientation[3] = pose->orientation.z();
+      body.valid = seen.valid ? 1 : 0;
+      if (!seen.valid) continue;
+      for (int axis = 0; axis < 3; ++axis) body.position_m[axis] = seen.position_m[axis];
+      body.orientation[0] = seen.orientation.w();
+      body.orientation[1] = seen.orientation.x();
+      body.orientation[2] = seen.orientation.y();
+      body.orientation[3] = seen.orientation.z();
     }
     if (!all_seen) ++summary_.unseen;
   }
@@ -244,26 +234,20 @@ class Importer {
   }
 
   template <class Message>
-  void append(lcm::LogFile& log, const std::string& channel, std::size_t row,
+  void append(EventLogWriter& log, const std::string& channel, std::size_t row,
               const Message& message) {
     bytes_.resize(static_cast<std::size_t>(message.getEncodedSize()));
     message.encode(bytes_.data(), 0, static_cast<int>(bytes_.size()));
-    lcm::LogEvent event{};
-    event.timestamp = time_us(row);
-    event.channel = channel;
-    event.datalen = static_cast<std::int32_t>(bytes_.size());
-    event.data = bytes_.data();
-    if (log.writeEvent(&event) != 0) throw std::runtime_error("the log could not be written");
+    log.write(time_us(row), channel, bytes_);
   }
 
   const RecordingMap& map_;
   const CsvTable& table_;
-  Eigen::Quaterniond z_up_;
-  std::vector<Pose> plates_;  // from a body to the segment frame it stands for
+  std::vector<PoseConvention> convention_;  // of every body, to the segment frame it carries
   ImportSummary summary_;
   softarm_messages::mocap_frame_t frame_{};
   std::size_t frame_row_ = 0;
-  std::vector<std::uint8_t> bytes_;
+  std::vector<std::byte> bytes_;
 };
 
 }  // namespace

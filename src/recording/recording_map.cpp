@@ -5,8 +5,7 @@
 #include <algorithm>
 #include <sstream>
 
-#include "config/reader.hpp"
-#include "config/yaml_tree.hpp"
+#include "softarm/config/config_keys.hpp"
 #include "softarm/model/arm.hpp"
 #include "softarm/transport/settings.hpp"
 
@@ -14,9 +13,11 @@ namespace softarm {
 namespace {
 
 constexpr auto kRequired = Presence::required;
-constexpr Range kText = {1.0, 2000.0};
+/// The form of column names. A function, because a map may be read before the variables of this
+/// file are initialised.
+Form names() { return from(1, 2000); }
 
-/// The map as it is written: names where RecordingMap has columns.
+/// The map as it is written in YAML: column names where RecordingMap has indices.
 struct NamedBody {
   int id = 0;
   std::string position, orientation;
@@ -32,80 +33,63 @@ struct NamedMap {
   std::optional<double> rest_from_s, rest_to_s;
 };
 
-void describe_body(SchemaVisitor& visitor, NamedBody& body) {
-  visitor.integer({"id", "", "of the body in our messages", from_to(0, 1e6), kRequired}, body.id);
-  visitor.text({"position", "", "names of the three columns x y z", kText, kRequired},
-               body.position);
-  visitor.text(
-      {"orientation", "", "names of the four columns, in quaternion_order", kText, kRequired},
-      body.orientation);
+void describe_body(Keys& key, NamedBody& it) {
+  key("id", it.id, from(0, 1e6), "of the body in our messages", kRequired);
+  key("position", it.position, names(), "names of the three columns x y z", kRequired);
+  key("orientation", it.orientation, names(), "names of the four columns, in quaternion_order",
+      kRequired);
 }
 
-void describe_table(SchemaVisitor& visitor, NamedMap& named, RecordingMap& map) {
-  static const std::array<const char*, 3> kUp = {"x", "y", "z"};
-  static const std::array<const char*, 2> kOrder = {"xyzw", "wxyz"};
-  visitor.text({"separator", "", "between the cells", from_to(1, 1)}, named.separator);
-  visitor.text({"time", "", "name of the time column", kText}, named.time);
-  visitor.number({"time_unit_s", "s", "one unit of time", above_to(0, 1e4)}, map.time_unit_s);
-  visitor.number({"position_unit_m", "m", "one unit of position", above_to(0, 1e4)},
-                 map.position_unit_m);
-  visitor.choice({"up", "", "axis of the world that points up"}, kUp, map.up);
-  visitor.choice({"quaternion_order", "", "order of orientation columns"}, kOrder, named.order);
-  visitor.optional_number(
-      {"frame_period_s", "s", "whole periods without a frame count as missing frames",
-       above_to(0, 1e3)},
-      map.frame_period_s);
+void describe_table(Keys& key, NamedMap& it, RecordingMap& map) {
+  key("separator", it.separator, from(1, 1), "between the cells");
+  key("time", it.time, names(), "name of the time column");
+  key("time_unit_s", map.time_unit_s, above(0, 1e4), "one unit of time");
+  key("position_unit_m", map.position_unit_m, above(0, 1e4), "one unit of position");
+  key("up", map.up, one_of({"x", "y", "z"}), "axis of the world that points up");
+  key("quaternion_order", it.order, one_of({"xyzw", "wxyz"}), "order of orientation columns");
+  key("frame_period_s", map.frame_period_s, above(0, 1e3),
+      "whole periods without a frame count as missing frames");
 }
 
-void describe_bodies(SchemaVisitor& visitor, NamedMap& named) {
-  visitor.section({"base", "", "the body at the base of the arm", {}, kRequired},
-                  SectionKind::plain, [&] { describe_body(visitor, named.base); });
-  visitor.list(
-      {"segments", "", "the bodies at the segments' ends, from the base on", {}, kRequired},
-      static_cast<int>(named.segments.size()),
-      [&](int size) { named.segments.resize(static_cast<std::size_t>(size)); },
-      [&](int i) {
-        NamedBody& body = named.segments[static_cast<std::size_t>(i)];
-        describe_body(visitor, body);
-        visitor.number({"length_m", "m", "from the body before to this one, at rest",
-                        above_to(0, 1e3), kRequired},
-                       body.length_m);
-      });
+void describe_rest(Keys& key, NamedMap& it, RecordingMap& map) {
+  key("from_s", it.rest_from_s, Form(), "begin of the window");
+  key("to_s", it.rest_to_s, Form(), "end of the window");
+  key("base_rotation", map.base_rotation, base_rotation(), "of S_0 in the world (z up)");
 }
 
-void describe_rest(SchemaVisitor& visitor, NamedMap& named, RecordingMap& map) {
-  static const std::array<const char*, 2> kNames = {"hanging", "standing"};
-  static const std::array<Eigen::Matrix3d, 2> kRotations = {
-      Eigen::Matrix3d(Eigen::Vector3d(1.0, -1.0, -1.0).asDiagonal()), Eigen::Matrix3d::Identity()};
-  visitor.section(
-      {"rest", "", "when the arm is still; its pose then reads straight"}, SectionKind::plain, [&] {
-        visitor.optional_number({"from_s", "s", "begin of the window"}, named.rest_from_s);
-        visitor.optional_number({"to_s", "s", "end of the window"}, named.rest_to_s);
-        visitor.matrix_or_word({"base_rotation", "", "of S_0 in the world (z up)", from_to(-1, 1)},
-                               kNames, kRotations, map.base_rotation);
-      });
+void describe_pressures(Keys& key, NamedMap& it, RecordingMap& map) {
+  key("unit_bar", map.pressure_unit_bar, above(0, 1e4), "one unit of pressure");
+  key("commanded", it.commanded, names(), "names of columns");
+  key("measured", it.measured, names(), "names of columns");
 }
 
-void describe_outputs(SchemaVisitor& visitor, NamedMap& named, RecordingMap& map) {
-  visitor.section({"pressures", "", "what was sent to the valves and what their sensors read"},
-                  SectionKind::plain, [&] {
-                    visitor.number({"unit_bar", "bar", "one unit of pressure", above_to(0, 1e4)},
-                                   map.pressure_unit_bar);
-                    visitor.text({"commanded", "", "names of columns", kText}, named.commanded);
-                    visitor.text({"measured", "", "names of columns", kText}, named.measured);
-                  });
-  visitor.section({"channels", "", "of the log"}, SectionKind::plain, [&] {
-    visitor.text({"mocap", "", "", from_to(1, 62)}, map.mocap_channel);
-    visitor.text({"command", "", "", from_to(1, 62)}, map.command_channel);
-    visitor.text({"measurement", "", "", from_to(1, 62)}, map.measurement_channel);
-  });
+void describe_channels(Keys& key, RecordingMap& map) {
+  key("mocap", map.mocap_channel, from(1, 62), "of frames");
+  key("command", map.command_channel, from(1, 62), "of what was commanded");
+  key("measurement", map.measurement_channel, from(1, 62), "of what was measured");
 }
 
-/// Turns names into columns of the table, or says which name of the map is not there.
+void describe_map(Keys& key, NamedMap& it, RecordingMap& map) {
+  describe_table(key, it, map);
+  key.section({"base", "the body at the base of the arm", kRequired},
+              [&] { describe_body(key, it.base); });
+  key.list({"segments", "the bodies at the segments' ends, from the base on", kRequired},
+           it.segments, [&](NamedBody& body) {
+             describe_body(key, body);
+             key("length_m", body.length_m, above(0, 1e3),
+                 "from the body before to this one, at rest", kRequired);
+           });
+  key.section({"rest", "when the arm is still; its pose then reads straight"},
+              [&] { describe_rest(key, it, map); });
+  key.section({"pressures", "what was sent to the valves and what their sensors read"},
+              [&] { describe_pressures(key, it, map); });
+  key.section({"channels", "of the log"}, [&] { describe_channels(key, map); });
+}
+
+/// Converts names to columns of the table; reports a name in the map that the table does not have.
 class ColumnFinder {
  public:
-  ColumnFinder(const ExperimentReader& reader, const CsvTable& table)
-      : reader_(reader), table_(table) {}
+  ColumnFinder(const ConfigKeys& reader, const CsvTable& table) : reader_(reader), table_(table) {}
 
   std::vector<std::size_t> find(const std::string& key, const std::string& names,
                                 std::size_t count) const {
@@ -142,11 +126,11 @@ class ColumnFinder {
   }
 
  private:
-  const ExperimentReader& reader_;
+  const ConfigKeys& reader_;
   const CsvTable& table_;
 };
 
-void check(const ExperimentReader& reader, const NamedMap& named, RecordingMap& map) {
+void check(const ConfigKeys& reader, const NamedMap& named, RecordingMap& map) {
   if (named.segments.size() > static_cast<std::size_t>(kMaxSegments)) {
     throw reader.error_at("segments", fmt::format("at most {}", kMaxSegments),
                           fmt::format("{}", named.segments.size()));
@@ -155,7 +139,7 @@ void check(const ExperimentReader& reader, const NamedMap& named, RecordingMap& 
   for (std::size_t i = 0; i < named.segments.size(); ++i) {
     const int id = named.segments[i].id;
     if (std::find(ids.begin(), ids.end(), id) != ids.end()) {
-      throw reader.error_at(fmt::format("segments[{}].id", i), "an id of its own",
+      throw reader.error_at(fmt::format("segments[{}].id", i), "a distinct id",
                             fmt::format("{} again", id));
     }
     ids.push_back(id);
@@ -173,7 +157,7 @@ void check(const ExperimentReader& reader, const NamedMap& named, RecordingMap& 
   }
   const Eigen::Matrix3d& R = map.base_rotation;
   if (!(R * R.transpose()).isIdentity(1e-6) || R.determinant() < 0.0) {
-    throw reader.error_at("rest.base_rotation", "a rotation", "a matrix that is none");
+    throw reader.error_at("rest.base_rotation", "a rotation", "a matrix that is not a rotation");
   }
 }
 
@@ -181,24 +165,18 @@ void check(const ExperimentReader& reader, const NamedMap& named, RecordingMap& 
 
 MappedTable read_mapped_table(const std::filesystem::path& table,
                               const std::filesystem::path& map) {
-  const YamlNode root = read_yaml_file(map);
-  ExperimentReader reader(root);
+  ConfigKeys keys(map);
   NamedMap named;
   MappedTable out;
   const LcmSettings channels;
   out.map.mocap_channel = channels.mocap_channel;
   out.map.command_channel = channels.command_channel;
   out.map.measurement_channel = channels.measurement_channel;
-  reader.read([&] {
-    describe_table(reader, named, out.map);
-    describe_bodies(reader, named);
-    describe_rest(reader, named, out.map);
-    describe_outputs(reader, named, out.map);
-  });
-  check(reader, named, out.map);
+  keys.visit([&] { describe_map(keys, named, out.map); });
+  check(keys, named, out.map);
 
   out.table = read_csv(table, named.separator.front());
-  const ColumnFinder finder(reader, out.table);
+  const ColumnFinder finder(keys, out.table);
   out.map.time_column = finder.one("time", named.time);
   out.map.bodies.push_back(finder.body("base", named.base, named.order));
   for (std::size_t i = 0; i < named.segments.size(); ++i) {

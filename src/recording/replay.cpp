@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "softarm/base/time.hpp"
 #include "softarm/config/load.hpp"
 #include "softarm/transport/message_decoding.hpp"
 #include "softarm/transport/settings.hpp"
@@ -37,7 +38,7 @@ void Replay::take(const LogEvent& event) {
   }
 }
 
-/// Commands and statuses wait for the record of their tick, which follows them.
+/// Commands and statuses wait for the record of their tick, which is sent after them.
 template <class Kind, class Tick>
 void Replay::keep(const LogEvent& event, Window<Kind>& window, Kind& incoming, Tick tick_of) {
   if (!decode(event.data, incoming.message)) {
@@ -61,7 +62,7 @@ void Replay::take_record(const LogEvent& event) {
     begin_run(record);
   }
   if (!record.build.empty()) check_build(record.build);
-  if (record.tick < next_) return;  // replayed already: its repetition
+  if (record.tick < next_) return;  // a repetition of a tick already replayed
   incoming.tick = record.tick;
   incoming.position = event.position;
   if (record.tick - next_ >= static_cast<std::int64_t>(kWindow)) {
@@ -74,7 +75,7 @@ void Replay::take_record(const LogEvent& event) {
   advance(kPatience);
 }
 
-/// Of an arm like ours, and with times that can be added and subtracted.
+/// Whether the record fits our arm and its times are small enough to calculate with.
 bool Replay::fits(const tick_record_t& record) const {
   constexpr std::int64_t kMost = 4'000'000'000'000'000'000;
   const auto sane = [](std::int64_t number) { return number >= 0 && number < kMost; };
@@ -97,7 +98,7 @@ void Replay::begin_run(const tick_record_t& first) {
         "the log was recorded with configuration {}, this one is {}; --any-configuration replays "
         "all the same",
         hash_text(recorded), hash_text(experiment_.hash)));
-  // What waits from an earlier run, which the same clock tells from this one.
+  // Discards messages that wait from an earlier run: the clock shows that they precede this run.
   const auto forget = [&first](auto& window) {
     for (auto& each : window)
       if (each.message.time_us < first.first_ns / 1000) each.tick = 0;
@@ -118,13 +119,14 @@ void Replay::begin_run(const tick_record_t& first) {
 void Replay::end_run() {
   if (!running_) return;
   advance(0);
-  summary_.duration_s += 1e-9 * static_cast<double>(last_ns_ - first_ns_);
+  summary_.duration_s += to_seconds(last_ns_ - first_ns_);
   running_ = false;
 }
 
 void Replay::finish() { end_run(); }
 
-/// Replays what can be, in order. A tick that is `patience` ticks behind the newest will not come.
+/// Replays all ticks that are available, in order. A tick that is `patience` ticks behind the
+/// newest is missing.
 void Replay::advance(std::int64_t patience) {
   while (next_ <= newest_) {
     WaitingRecord& waiting = place(*records_, next_);
@@ -148,7 +150,7 @@ void Replay::add_gap(std::int64_t first, std::int64_t last, const WaitingRecord&
   ++summary_.gap_count;
   if (summary_.gaps.size() < ReplaySummary::kGapsKept)
     summary_.gaps.push_back(
-        {first, last, next.position, 1e-9 * static_cast<double>(next.message.now_ns - first_ns_)});
+        {first, last, next.position, to_seconds(next.message.now_ns - first_ns_)});
 }
 
 void Replay::run(const WaitingRecord& record) {
@@ -207,7 +209,7 @@ void Replay::note(std::vector<FieldDifference> fields, const WaitingRecord& reco
   if (first.fields.empty()) {
     first.tick = record.tick;
     first.run = summary_.runs;
-    first.time_s = 1e-9 * static_cast<double>(record.message.now_ns - first_ns_);
+    first.time_s = to_seconds(record.message.now_ns - first_ns_);
     first.position = position;
   }
   if (first.tick != record.tick || first.run != summary_.runs) return;

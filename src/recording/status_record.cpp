@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "softarm/base/time.hpp"
 #include "softarm/model/kinematics.hpp"
 #include "softarm/transport/message_decoding.hpp"
 #include "softarm/transport/settings.hpp"
@@ -12,57 +13,29 @@
 namespace softarm {
 namespace {
 
-constexpr std::int64_t kTruthPatience_us =
-    100'000;                                ///< how long a row waits for the plant's word on it
-constexpr std::size_t kWaitingRows = 4096;  ///< more than the patience lasts at any rate
-
-using softarm_messages::plant_state_t;
-
-SegmentVector flatten(const std::vector<std::vector<float>>& pairs) {
-  SegmentVector flat(static_cast<Eigen::Index>(2 * pairs.size()));
-  for (std::size_t i = 0; i < pairs.size(); ++i)
-    for (std::size_t axis = 0; axis < 2; ++axis)
-      flat[static_cast<Eigen::Index>(2 * i + axis)] = pairs[i][axis];
-  return flat;
-}
-
-template <class Vector>
-Vector to_vector(const std::vector<float>& values) {
-  return Eigen::Map<const Eigen::VectorXf>(values.data(), static_cast<Eigen::Index>(values.size()))
-      .cast<double>();
-}
+/// How long a row waits for the true state from the plant.
+constexpr std::int64_t kTruthPatience_us = 100'000;
 
 }  // namespace
 
-void TruthTrack::add(const plant_state_t& state) {
+void TruthTrack::add(const PlantState& state) {
   before_ = std::move(after_);
   after_ = state;
 }
+
 void TruthTrack::fill(std::int64_t time_us, LogRow& row) const {
   if (!before_ || !after_ || time_us < before_->time_us || time_us > after_->time_us) return;
   const auto span =
       static_cast<double>(std::max<std::int64_t>(1, after_->time_us - before_->time_us));
   const double s = static_cast<double>(time_us - before_->time_us) / span;
-  // Cubic through both ends with the velocities told there: exact to h^4/384 of the fourth
-  // derivative.
+  // Cubic Hermite interpolation of the states and velocities at both ends: the error is at most
+  // h^4/384 times the fourth derivative.
   const double h = 1e-6 * span;
-  const double weights[] = {(1 + 2 * s) * (1 - s) * (1 - s), h * s * (1 - s) * (1 - s),
-                            s * s * (3 - 2 * s), h * s * s * (s - 1)};
-  const auto pair = [&](const std::vector<std::vector<double>>& from, std::size_t i,
-                        std::size_t axis) { return from[i][axis]; };
-  row.truth.resize(static_cast<Eigen::Index>(2 * after_->u_rad.size()));
-  for (std::size_t i = 0; i < after_->u_rad.size(); ++i)
-    for (std::size_t axis = 0; axis < 2; ++axis)
-      row.truth[static_cast<Eigen::Index>(2 * i + axis)] =
-          weights[0] * pair(before_->u_rad, i, axis) +
-          weights[1] * pair(before_->velocity_radps, i, axis) +
-          weights[2] * pair(after_->u_rad, i, axis) +
-          weights[3] * pair(after_->velocity_radps, i, axis);
-  row.real = to_vector<PressureVector>(after_->pressure_bar);
-  Eigen::Vector3d tip;
-  for (int axis = 0; axis < 3; ++axis)
-    tip[axis] = (1 - s) * before_->tip_m[axis] + s * after_->tip_m[axis];
-  row.tip = tip;
+  row.truth = (1 + 2 * s) * (1 - s) * (1 - s) * before_->u_rad +
+              h * s * (1 - s) * (1 - s) * before_->velocity_radps +
+              s * s * (3 - 2 * s) * after_->u_rad + h * s * s * (s - 1) * after_->velocity_radps;
+  row.real = after_->pressure_bar;
+  row.tip = (1 - s) * before_->tip_m + s * after_->tip_m;
 }
 
 StatusRecord::StatusRecord(const Experiment& experiment, const std::filesystem::path& folder)
@@ -75,43 +48,47 @@ StatusRecord::StatusRecord(const Experiment& experiment, const std::filesystem::
 
 bool StatusRecord::take(std::string_view channel, std::span<const std::byte> bytes) {
   const LcmSettings& lcm = experiment_.transport.lcm;
-  if (channel == lcm.status_channel) return take_status(bytes);
-  if (channel == lcm.plant_channel) {
-    if (decode(bytes, plant_message_) && plant_message_.num_segments == experiment_.arm.size())
-      truth_.add(plant_message_);
+  bool is_status = false;
+  if (channel == lcm.status_channel) {
+    is_status = take_status(bytes);
+  } else if (channel == lcm.plant_channel) {
+    if (PlantState state; decode(bytes, state) && state.segments() == experiment_.arm.size() &&
+                          is_time_us(state.time_us))
+      truth_.add(state);
   } else if (channel == lcm.timing_channel) {
     timing_received_ |= decode(bytes, timing_);
   }
-  return false;
+  write_rows(false);
+  return is_status;
 }
 
 bool StatusRecord::take_status(std::span<const std::byte> bytes) {
-  if (!decode(bytes, decoded_) || decoded_.num_segments != experiment_.arm.size()) return false;
-  // A shadow may be watched alone; beside the daemon that moves the arm it is not what is asked
-  // for.
-  const bool shadow = (decoded_.flags & decoded_.SHADOW) != 0;
-  if (shadow && commander_heard_) return false;
-  commander_heard_ = !shadow;
-  std::swap(status_, decoded_);
-  // The reference in a status belongs to the middle of the period that begins with its tick.
+  ArmStatus newest;
+  if (!decode(bytes, newest) || newest.segments() != experiment_.arm.size() ||
+      !is_time_us(newest.time_us))
+    return false;
+  // A shadow may be recorded alone, but not beside the daemon that moves the arm.
+  if (newest.shadow && commander_heard_) return false;
+  commander_heard_ = !newest.shadow;
+  status_ = std::move(newest);
+  // The reference in a status is that of the middle of the period that begins with its tick.
   const double period_s = 1.0 / experiment_.rate_hz;
   const std::int64_t time_us = status_.time_us + static_cast<std::int64_t>(0.5e6 * period_s);
   if (rows_++ == 0) start_us_ = time_us;
-  if (waiting_.size() >= kWaitingRows) return true;
   LogRow row;
   row.t_s = 1e-6 * static_cast<double>(time_us - start_us_);
-  row.mode = static_cast<Mode>(std::clamp<int>(status_.mode, 0, static_cast<int>(Mode::fault)));
-  row.reason = static_cast<Reason>(std::clamp<int>(status_.reason, 0, kReasons - 1));
-  row.saturated = (status_.flags & status_.SATURATED) != 0;
+  row.mode = std::clamp(status_.mode, Mode::init, Mode::fault);
+  row.reason = std::clamp(status_.reason, Reason::none, static_cast<Reason>(kReasons - 1));
+  row.saturated = status_.saturated;
   row.frame_age_s = status_.frame_age_s;
-  row.u = flatten(status_.u_rad);
-  row.velocity = flatten(status_.velocity_radps);
-  row.residual_twist = to_vector<SegmentVector>(status_.residual_twist_rad);
-  row.residual_length = to_vector<SegmentVector>(status_.residual_length_m);
-  row.commanded = to_vector<PressureVector>(status_.pressure_bar);
+  row.u = status_.u_rad;
+  row.velocity = status_.velocity_radps;
+  row.residual_torsion = status_.torsion_rad;
+  row.residual_length = status_.length_error_m;
+  row.commanded = status_.pressure_bar;
   if (row.mode == Mode::active) {
-    row.reference = flatten(status_.reference_u_rad);
-    row.tau_actuation = flatten(status_.tau_actuation_nm);
+    row.reference = status_.reference_u_rad;
+    row.tau_actuation = status_.tau_actuation_nm;
     row.tip_reference = tip_position(experiment_.arm, row.reference);
     active_s_ += period_s;
   }
@@ -123,8 +100,10 @@ void StatusRecord::write_rows(bool all) {
   const std::int64_t newest_us = waiting_.empty() ? 0 : waiting_.back().time_us;
   while (!waiting_.empty()) {
     WaitingRow& next = waiting_.front();
-    if (!all && !truth_.reaches(next.time_us) && newest_us - next.time_us < kTruthPatience_us)
-      return;
+    // A clock that has gone back is that of another daemon: the true state will not come.
+    const std::int64_t waited_us = newest_us - next.time_us;
+    const bool patient = waited_us >= 0 && waited_us < kTruthPatience_us;
+    if (!all && patient && !truth_.reaches(next.time_us)) return;
     truth_.fill(next.time_us, next.row);
     if (log_) log_->add(next.row);
     summary_.add(next.row, 1.0 / experiment_.rate_hz);

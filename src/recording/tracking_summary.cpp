@@ -3,9 +3,8 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <nlohmann/json.hpp>
 #include <numbers>
-
-#include "softarm/base/json_writer.hpp"
 
 namespace softarm {
 namespace {
@@ -55,13 +54,35 @@ void TrackingSummary::add_tip(const LogRow& row) {
   if (!row.tip || !row.tip_reference) return;
   const double error = (*row.tip - *row.tip_reference).norm(), since = row.t_s - active_since_s_;
   if (since >= tracking_from_s_) {
-    tip_squared_.emplace_back(row.t_s, error * error);
+    tip_.add(row.t_s, error);
     tip_max_m_ = std::isnan(tip_max_m_) ? error : std::max(tip_max_m_, error);
   }
   if (!row.tip_is_asked) return;
   tip_is_asked_ = true;
   if (error >= kTipNear_m || since < tip_last_s_) tip_last_far_s_ = since;
   tip_last_s_ = since;
+}
+
+void TrackingSummary::TipErrors::add(double t_s, double error_m) {
+  if (stretches_.empty() || stretches_.back().errors.count >= rows_a_stretch_) {
+    if (stretches_.size() == kMostStretches) {
+      for (std::size_t k = 0; k < kMostStretches / 2; ++k) {
+        stretches_[k] = stretches_[2 * k];
+        stretches_[k].errors.add(stretches_[2 * k + 1].errors);
+      }
+      stretches_.resize(kMostStretches / 2);
+      rows_a_stretch_ *= 2;
+    }
+    stretches_.push_back({t_s, {}});
+  }
+  stretches_.back().errors.add(error_m);
+}
+
+TrackingSummary::MeanSquare TrackingSummary::TipErrors::since(double t_s) const {
+  MeanSquare all;
+  for (const Stretch& stretch : stretches_)
+    if (stretch.begin_s >= t_s) all.add(stretch.errors);
+  return all;
 }
 
 void TrackingSummary::add_tracking(const LogRow& row) {
@@ -84,90 +105,69 @@ void TrackingSummary::add_tracking(const LogRow& row) {
   }
 }
 
+struct TrackingSummary::Json {
+  using Value = nlohmann::ordered_json;
+
+  static Value rms_of(const std::vector<MeanSquare>& values) {
+    Value list = Value::array();
+    for (const MeanSquare& each : values) list.push_back(each.rms());
+    return list;
+  }
+
+  static Value tracking(const TrackingSummary& of) {
+    const double half_s = 0.5 * (of.first_t_s_ + of.last_t_s_);
+    Value json{{"u_rms_rad", of.u_.rms()},
+               {"u_max_rad", of.u_max_rad_},
+               {"u_rms_segment_rad", rms_of(of.u_of_segment_)},
+               {"theta_rms_rad", rms_of(of.theta_)},
+               {"phi_rms_rad", rms_of(of.phi_)},
+               {"tip_rms_m", of.tip_.since(-std::numeric_limits<double>::infinity()).rms()},
+               {"tip_rms_second_half_m", of.tip_.since(half_s).rms()}};
+    if (of.tip_is_asked_) {
+      json["tip_max_m"] = of.tip_max_m_;
+      json["tip_near_after_s"] = of.tip_last_far_s_ < of.tip_last_s_
+                                     ? of.tip_last_far_s_
+                                     : std::numeric_limits<double>::quiet_NaN();
+    }
+    return json;
+  }
+
+  static Value modes(const TrackingSummary& of) {
+    Value json = Value::object();
+    for (std::size_t k = 0; k < of.mode_s_.size(); ++k)
+      if (of.mode_s_[k] > 0.0) json[name(static_cast<Mode>(k))] = of.mode_s_[k];
+    return json;
+  }
+
+  static Value transitions(const TrackingSummary& of) {
+    Value list = Value::array();
+    for (const Transition& each : of.transitions_)
+      list.push_back({{"t_s", each.t_s}, {"mode", name(each.mode)}, {"reason", name(each.reason)}});
+    return list;
+  }
+};
+
 std::string TrackingSummary::json() const {
-  JsonWriter json;
-  json.open_object();
-  json.member("duration_s", duration_s());
-  json.member("ticks", ticks_);
-  json.key("tracking");
-  write_tracking(json);
-  json.key(torques_ ? "torque_nm" : "pressure_bar");
-  json.open_object();
-  json.member("max", command_max_);
-  json.close_object();
-  json.member("saturated_fraction", active_ticks_ > 0 ? static_cast<double>(saturated_ticks_) /
-                                                            static_cast<double>(active_ticks_)
-                                                      : 0.0);
-  json.key("modes");
-  json.open_object();
-  for (std::size_t k = 0; k < mode_s_.size(); ++k)
-    if (mode_s_[k] > 0.0) json.member(name(static_cast<Mode>(k)), mode_s_[k]);
-  json.close_object();
-  json.key("transitions");
-  json.open_array();
-  for (const Transition& transition : transitions_) {
-    json.open_object();
-    json.member("t_s", transition.t_s);
-    json.member("mode", name(transition.mode));
-    json.member("reason", name(transition.reason));
-    json.close_object();
-  }
-  json.close_array();
-  if (frames_) write_frames(json);
-  json.close_object();
-  return json.text() + "\n";
-}
-
-void TrackingSummary::write_tracking(JsonWriter& json) const {
-  const auto list = [&json](const char* key, const std::vector<MeanSquare>& values) {
-    json.key(key);
-    json.open_array();
-    for (const MeanSquare& each : values) json.value(each.rms());
-    json.close_array();
-  };
-  const double half_s = 0.5 * (first_t_s_ + last_t_s_);
-  MeanSquare tip, tip_second_half;
-  for (const auto& [t_s, squared] : tip_squared_) {
-    tip.sum += squared;
-    ++tip.count;
-    if (t_s < half_s) continue;
-    tip_second_half.sum += squared;
-    ++tip_second_half.count;
-  }
-  json.open_object();
-  json.member("u_rms_rad", u_.rms());
-  json.member("u_max_rad", u_max_rad_);
-  list("u_rms_segment_rad", u_of_segment_);
-  list("theta_rms_rad", theta_);
-  list("phi_rms_rad", phi_);
-  json.member("tip_rms_m", tip.rms());
-  json.member("tip_rms_second_half_m", tip_second_half.rms());
-  if (tip_is_asked_) {
-    json.member("tip_max_m", tip_max_m_);
-    json.member("tip_near_after_s", tip_last_far_s_ < tip_last_s_
-                                        ? tip_last_far_s_
-                                        : std::numeric_limits<double>::quiet_NaN());
-  }
-  json.close_object();
-}
-
-void TrackingSummary::write_frames(JsonWriter& json) const {
-  json.key("frames");
-  json.open_object();
-  json.member("accepted", frames_->accepted);
-  json.member("rejected", frames_->rejected());
-  json.member("repeated", frames_->repeated);
-  json.member("missing", frames_->missing);
-  json.member("late", late_frames_);
-  json.close_object();
+  const double saturated =
+      active_ticks_ > 0 ? static_cast<double>(saturated_ticks_) / static_cast<double>(active_ticks_)
+                        : 0.0;
+  Json::Value json{{"duration_s", duration_s()},
+                   {"ticks", ticks_},
+                   {"tracking", Json::tracking(*this)},
+                   {torques_ ? "torque_nm" : "pressure_bar", {{"max", command_max_}}},
+                   {"saturated_fraction", saturated},
+                   {"modes", Json::modes(*this)},
+                   {"transitions", Json::transitions(*this)}};
+  if (frames_)
+    json["frames"] = {{"accepted", frames_->accepted},
+                      {"rejected", frames_->rejected()},
+                      {"repeated", frames_->repeated},
+                      {"missing", frames_->missing},
+                      {"late", late_frames_}};
+  return json.dump() + "\n";
 }
 
 std::string TrackingSummary::tip_line() const {
-  MeanSquare tip;
-  for (const auto& [t_s, squared] : tip_squared_) {
-    tip.sum += squared;
-    ++tip.count;
-  }
   const std::string arrived =
       tip_last_far_s_ < tip_last_s_
           ? fmt::format("within {:.0f} mm for good {:.2f} s after ACTIVE", 1e3 * kTipNear_m,
@@ -175,7 +175,8 @@ std::string TrackingSummary::tip_line() const {
           : fmt::format("not within {:.0f} mm at the end", 1e3 * kTipNear_m);
   return fmt::format(
       "tip error {:.3f} mm rms, {:.3f} mm at most, from {:g} s after ACTIVE on; {}\n",
-      1e3 * tip.rms(), 1e3 * tip_max_m_, tracking_from_s_, arrived);
+      1e3 * tip_.since(-std::numeric_limits<double>::infinity()).rms(), 1e3 * tip_max_m_,
+      tracking_from_s_, arrived);
 }
 
 std::string TrackingSummary::table() const {

@@ -3,18 +3,27 @@
 #include <algorithm>
 #include <cmath>
 
+#include "softarm/base/time.hpp"
+#include "softarm/estimation/model_observer.hpp"
 #include "softarm/runtime/settings.hpp"
 
 namespace softarm {
 namespace {
 
-constexpr std::int64_t kNever = SafetyInput::kNever;
 /// The arm may overshoot what its reference may not exceed, by so much.
 constexpr double kSoftLimitMargin = 1.1;
 /// A command that has moved by so much must move the arm, unless the poses are frozen.
 constexpr double kFrozenCommandChange_bar = 0.05;
 
-std::int64_t to_ns(double time_s) noexcept { return std::llround(time_s * 1e9); }
+std::unique_ptr<ModelObserver> make_observer(const PipelineSettings& settings) {
+  if (settings.estimation.observer != ObserverKind::model) return nullptr;
+  return std::make_unique<ModelObserver>(
+      settings.arm, settings.estimation, body_noise(settings.estimation, settings.arm.size()),
+      ObserverTiming{.valve_lag_s = settings.control.valve_lag_s,
+                     .max_latency_s = settings.safety.max_latency_s,
+                     .control_period_s = 1.0 / settings.rate_hz,
+                     .dead_time_s = settings.control.dead_time_s});
+}
 
 }  // namespace
 
@@ -25,6 +34,8 @@ ControlPipeline::ControlPipeline(const PipelineSettings& settings)
       validator_(settings.estimation, settings.arm,
                  body_noise(settings.estimation, settings.arm.size())),
       filter_(settings.estimation, settings.arm.size()),
+      observer_(make_observer(settings)),
+      delay_ns_(observer_ ? to_ns(settings.control.dead_time_s) : 0),
       safety_(settings.safety, period_s_),
       reference_(settings.reference, settings.control, settings.arm),
       controller_(settings.arm, settings.control),
@@ -34,10 +45,13 @@ ControlPipeline::ControlPipeline(const PipelineSettings& settings)
       curvature_watch_(settings.safety, settings.arm),
       previous_bar_(PressureVector::Zero(allocator_.chambers())),
       previous_tau_nm_(SegmentVector::Zero(settings.arm.dof())),
+      commanded_tau_nm_(previous_tau_nm_),
       pressure_at_last_motion_bar_(previous_bar_) {
   seen_ns_.fill(kNever);
   output_.pressure_bar = previous_bar_;
 }
+
+ControlPipeline::~ControlPipeline() = default;
 
 const TickOutput& ControlPipeline::tick(const TickInput& input) noexcept {
   if (!ticked_) epoch_ns_ = input.now_ns;
@@ -47,7 +61,7 @@ const TickOutput& ControlPipeline::tick(const TickInput& input) noexcept {
 
   // The command is held over the coming period: it is computed for the middle of it.
   const std::int64_t act_ns = input.now_ns + period_ns_ / 2;
-  predict(act_ns);
+  predict(input.now_ns, act_ns);
   safety.motion_unknown = !output_.motion.all_valid();
   safety.command_expired = input.command_expired && ticked_;
   watch(input, safety);
@@ -65,10 +79,13 @@ const TickOutput& ControlPipeline::tick(const TickInput& input) noexcept {
   take_reference(input);
   if (mode == Mode::active) {
     reference_.advance(seconds(act_ns));
-    reference_.window(seconds(act_ns), controller_.lookahead_s(), window_);
-    control();
+    control(act_ns);
   }
   limit(mode);
+  if (observer_) {
+    allocator_.torque(output_.pressure_bar, commanded_tau_nm_);
+    observer_->command(input.now_ns, commanded_tau_nm_);
+  }
   pressure_watch_.command(input.now_ns, output_.pressure_bar);
 
   output_.mode = mode;
@@ -84,6 +101,7 @@ void ControlPipeline::forget_command() noexcept {
   previous_bar_.setZero();
   output_.pressure_bar.setZero();
   pressure_watch_.reset();
+  if (observer_) observer_->vented();
 }
 
 void ControlPipeline::validate_and_estimate(const TickInput& input, SafetyInput& safety) noexcept {
@@ -93,6 +111,7 @@ void ControlPipeline::validate_and_estimate(const TickInput& input, SafetyInput&
   if (gap) {
     validator_.reset();
     filter_.reset();
+    if (observer_) observer_->reset();
     pressure_watch_.reset();
     curvature_watch_.reset();
   }
@@ -135,22 +154,19 @@ void ControlPipeline::validate_and_estimate(const TickInput& input, SafetyInput&
   safety.newest_measurement_ns = input.newest_measurement_ns;
   safety.deadman_used = settings_.safety.deadman;
   safety.newest_go_ns = input.newest_go_ns;
-  safety.arm = input.arm;
-  safety.disarm = input.disarm;
-  safety.emergency_stop = input.emergency_stop;
-  safety.shutdown = input.shutdown;
+  safety.requests = input.requests;
   output_.soft_limit = safety.soft_limit_exceeded;
-  output_.frame_age_s = newest_capture_ns_ == 0
+  output_.frame_age_s = newest_capture_ns_ == kNever
                             ? std::numeric_limits<double>::quiet_NaN()
-                            : 1e-9 * static_cast<double>(input.now_ns - newest_capture_ns_);
+                            : to_seconds(input.now_ns - newest_capture_ns_);
 }
 
 void ControlPipeline::watch(const TickInput& input, SafetyInput& safety) noexcept {
   if (input.measured_bar != nullptr && input.measured_bar->size() == previous_bar_.size())
     pressure_watch_.measure(*input.measured_bar);
-  safety.pressure_mismatch = settings_.safety.valve_readback && pressure_watch_.strays();
+  safety.pressure_mismatch = settings_.safety.valve_readback && pressure_watch_.out_of_tolerance();
   if (!curvature_watch_.used()) return;
-  // What is judged is the balance of an arm that is watched and told what to do.
+  // What is judged is the balance of an arm that is observed and commanded.
   const bool under_control = safety_.mode() == Mode::active || safety_.mode() == Mode::hold;
   if (under_control && !safety.motion_unknown) {
     allocator_.torque(previous_bar_, previous_tau_nm_);
@@ -158,7 +174,7 @@ void ControlPipeline::watch(const TickInput& input, SafetyInput& safety) noexcep
   } else {
     curvature_watch_.reset();
   }
-  safety.curvature_mismatch = curvature_watch_.strays();
+  safety.curvature_mismatch = curvature_watch_.out_of_tolerance();
 }
 
 void ControlPipeline::use_frame(const MocapFrame& frame) noexcept {
@@ -172,14 +188,25 @@ void ControlPipeline::use_frame(const MocapFrame& frame) noexcept {
   const BodyPose& tip = frame.body[static_cast<std::size_t>(settings_.arm.size())];
   if (tip.valid) reference_.measure_tip(seconds(frame.capture_ns), tip.position_m);
 
-  // Under control the arm is expected to do what it is told; the filter then smooths only the rest.
+  // Under control the arm is expected to follow its commands; the filter then smooths only the
+  // deviation.
   const bool expects = safety_.mode() == Mode::active;
   if (expects) expect(frame.capture_ns);
   filter_.update(frame.capture_ns, estimate, expects ? &known_ : nullptr);
+  if (observer_)
+    observer_->update(frame, estimate, expects ? &known_ : nullptr, !output_.saturated);
 }
 
-void ControlPipeline::predict(std::int64_t at_ns) noexcept {
+void ControlPipeline::predict(std::int64_t now_ns, std::int64_t at_ns) noexcept {
   const bool expects = safety_.mode() == Mode::active;
+  output_.observer = nullptr;
+  if (observer_) {
+    observer_->predict(now_ns, at_ns, output_.motion);
+    if (observer_->running()) {
+      output_.observer = observer_.get();
+      return;
+    }
+  }
   if (expects) expect(at_ns);
   filter_.predict(at_ns, output_.motion, expects ? &known_ : nullptr);
 }
@@ -198,10 +225,14 @@ void ControlPipeline::take_reference(const TickInput& input) noexcept {
   output_.reference_limited = verdict != LiveVerdict::accepted && verdict != LiveVerdict::not_live;
 }
 
-void ControlPipeline::control() noexcept {
-  controller_.compute(output_.motion.u_rad, output_.motion.velocity_radps, window_, control_);
+void ControlPipeline::control(std::int64_t act_ns) noexcept {
+  const std::int64_t ahead_ns = output_.observer != nullptr ? delay_ns_ : 0;
+  reference_.window(seconds(act_ns + ahead_ns), controller_.lookahead_s(), window_);
+  controller_.compute(output_.motion.u_rad, output_.motion.velocity_radps, window_, control_,
+                      output_.observer != nullptr ? &output_.observer->correction() : nullptr);
   allocator_.allocate(control_.tau_actuation_nm, allocation_);
   controller_.integrate(period_s_, output_.motion.u_rad, window_.now, allocation_.scale);
+  if (ahead_ns > 0) reference_.sample(seconds(act_ns), window_.now);
   output_.reference = window_.now;
   output_.reference_limited |= window_.now.limited;
   output_.tau_actuation_nm = control_.tau_actuation_nm;

@@ -3,14 +3,16 @@
 #include <algorithm>
 #include <cmath>
 
+#include "softarm/base/time.hpp"
 #include "softarm/model/actuation_matrix.hpp"
+#include "softarm/model/statics.hpp"
 #include "softarm/runtime/settings.hpp"
 
 namespace softarm {
 
 PressureWatch::PressureWatch(const SafetySettings& settings, int chambers) noexcept
     : tolerance_bar_(settings.pressure_tolerance_bar),
-      settling_ns_(std::llround(1e9 * settings.pressure_settling_s)) {
+      settling_ns_(to_ns(settings.pressure_settling_s)) {
   for (PressureVector* bound : {&now_.low, &now_.high, &before_.low, &before_.high})
     bound->setZero(chambers);
 }
@@ -42,10 +44,10 @@ void PressureWatch::reset() noexcept { known_ = in_row_ = 0; }
 
 CurvatureWatch::CurvatureWatch(const SafetySettings& settings, const ArmParameters& arm)
     : limit_nm_(settings.curvature_residual_nm),
-      settling_ns_(std::llround(1e9 * settings.curvature_settling_s)),
+      settling_ns_(to_ns(settings.curvature_settling_s)),
       arm_(arm),
       workspace_(arm) {
-  for (SegmentVector* v : {&at_rest_, &force_, &actuated_}) v->setZero(arm.dof());
+  for (SegmentVector* v : {&force_, &actuated_}) v->setZero(arm.dof());
 }
 
 void CurvatureWatch::judge(std::int64_t now_ns, ConstVectorRef u_rad,
@@ -61,9 +63,7 @@ void CurvatureWatch::judge(std::int64_t now_ns, ConstVectorRef u_rad,
 
 double CurvatureWatch::largest_residual_nm(ConstVectorRef u_rad,
                                            ConstVectorRef tau_actuation_nm) noexcept {
-  const DynamicsTerms gravity_only{.inertia = false, .coriolis = false, .gravity = true};
-  inverse_dynamics(arm_, workspace_, u_rad, at_rest_, at_rest_, at_rest_, gravity_only, force_);
-  add_impedance(arm_, u_rad, at_rest_, force_);
+  static_moments(arm_, workspace_, u_rad, force_);
   apply_actuation(arm_, u_rad, tau_actuation_nm, actuated_);
   double largest = 0.0;
   for (Eigen::Index i = 0; i < force_.size(); i += 2)

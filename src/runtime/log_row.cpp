@@ -15,7 +15,7 @@ void fill_from_pipeline(const ControlPipeline& pipeline, const ArmParameters& ar
   row.velocity = output.motion.velocity_radps;
   row.reference = output.reference.u;
   row.tau_actuation = output.tau_actuation_nm;
-  row.residual_twist = Eigen::Map<const Eigen::VectorXd>(estimate.twist_rad.data(), arm.size());
+  row.residual_torsion = Eigen::Map<const Eigen::VectorXd>(estimate.twist_rad.data(), arm.size());
   row.residual_length =
       Eigen::Map<const Eigen::VectorXd>(estimate.length_error_m.data(), arm.size());
   row.commanded = output.pressure_bar;

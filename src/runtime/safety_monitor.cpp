@@ -4,16 +4,17 @@
 #include <array>
 #include <cmath>
 
+#include "softarm/base/time.hpp"
 #include "softarm/runtime/settings.hpp"
 
 namespace softarm {
 namespace {
 
-/// So long after a stop of the daemon what is handled may have been sent before its end: it queues
-/// in the kernel.
+/// For this long after a stop of the daemon, messages may have been sent before its end: they were
+/// queued in the kernel.
 constexpr std::int64_t kStale_ns = 500'000'000;
 
-/// Everything a cause may look at.
+/// Everything that a cause may depend on.
 struct Evidence {
   const SafetyInput& input;
   const SafetySettings& settings;
@@ -38,16 +39,16 @@ struct Cause {
   bool (*present)(const Evidence&);
 };
 
-/// Every cause, the most severe first: `shutdown` because nothing follows it, then by what they
+/// Every cause, the most severe first: `shutdown` because it is final, then by the mode they
 /// demand. Valves that are silent or do not follow are a fault where there is pressure; where there
 /// is none they only keep the arm from becoming active, so that valves may be switched on after the
 /// daemon. Overruns are ticks missed in a row, and judged only under SCHED_FIFO
 /// (consecutive_overruns is zero otherwise): without it they are only counted.
 constexpr std::array kCauses{
     Cause{{Reason::shutdown, Mode::vent, Clearance::never},
-          [](const Evidence& e) { return e.input.shutdown; }},
+          [](const Evidence& e) { return e.input.requests.shutdown; }},
     Cause{{Reason::emergency_stop, Mode::fault, Clearance::disarm_then_arm},
-          [](const Evidence& e) { return e.input.emergency_stop; }},
+          [](const Evidence& e) { return e.input.requests.emergency_stop; }},
     Cause{{Reason::valves_silent, Mode::fault, Clearance::disarm_then_arm},
           [](const Evidence& e) { return e.valves_silent() && e.pressurised(); }},
     Cause{{Reason::pressure_mismatch, Mode::fault, Clearance::disarm_then_arm},
@@ -55,7 +56,7 @@ constexpr std::array kCauses{
     Cause{{Reason::curvature_mismatch, Mode::fault, Clearance::disarm_then_arm},
           [](const Evidence& e) { return e.input.curvature_mismatch; }},
     Cause{{Reason::disarmed, Mode::vent, Clearance::arm},
-          [](const Evidence& e) { return e.input.disarm; }},
+          [](const Evidence& e) { return e.input.requests.disarm; }},
     Cause{{Reason::deadman_released, Mode::vent, Clearance::arm},
           [](const Evidence& e) {
             return e.input.deadman_used && e.go_age_ns > e.thresholds.deadman_timeout_ns;
@@ -98,20 +99,12 @@ constexpr auto kRules = [] {
   return rules;
 }();
 
-/// now - then without overflow where `then` is never.
-std::int64_t age(std::int64_t now_ns, std::int64_t then_ns) noexcept {
-  return then_ns == SafetyInput::kNever ? std::numeric_limits<std::int64_t>::max()
-                                        : now_ns - then_ns;
-}
-
-/// The values named may come off the wire.
+/// The value may come from a message.
 template <class Enumeration, std::size_t count>
 const char* name_of(Enumeration value, const std::array<const char*, count>& names) noexcept {
   const auto index = static_cast<std::size_t>(value);
   return index < count ? names[index] : "unknown";
 }
-
-std::int64_t to_ns(double time_s) noexcept { return std::llround(time_s * 1e9); }
 
 }  // namespace
 
@@ -169,8 +162,8 @@ SafetyMonitor::SafetyMonitor(const SafetySettings& settings, double control_peri
       armed_(settings.arming == Arming::automatic) {}
 
 /// LCM drops the newest messages when a queue is full: after a stop longer than valves may be
-/// silent their newest measurement looks old although they never were. Where nothing was heard
-/// since the stop before, another one changes nothing.
+/// silent their newest measurement looks old although they never were. If no measurement has
+/// arrived since the previous stop, another stop changes nothing.
 void SafetyMonitor::note_stop(const SafetyInput& input) noexcept {
   if (mode_ == Mode::init) return;
   const std::int64_t stopped_ns = input.now_ns - previous_tick_ns_;
@@ -188,29 +181,30 @@ CauseRule SafetyMonitor::worst_cause(const SafetyInput& input) const noexcept {
       .settings = settings_,
       .thresholds = thresholds_,
       .mode = mode_,
-      .frame_age_ns = age(input.now_ns, input.newest_capture_ns),
+      .frame_age_ns = age_ns(input.now_ns, input.newest_capture_ns),
       .tick_gap_ns = ticked_before ? input.now_ns - previous_tick_ns_ : 0,
       .measurement_age_ns =
-          input.newest_measurement_ns == SafetyInput::kNever
-              ? std::numeric_limits<std::int64_t>::max()
+          input.newest_measurement_ns == kNever
+              ? kForever
               : input.now_ns - std::max(input.newest_measurement_ns, listening_since_ns_),
-      .go_age_ns = age(input.now_ns, input.newest_go_ns)};
+      .go_age_ns = age_ns(input.now_ns, input.newest_go_ns)};
   for (const Cause& cause : kCauses)
     if (cause.present(evidence)) return cause.rule;
   return {Reason::none, Mode::active, Clearance::good_frames};
 }
 
 void SafetyMonitor::take_operator_requests(const SafetyInput& input, Mode demanded) noexcept {
-  // Armed is granted for what the operator sees now, never stored up for when a cause has gone, nor
-  // for what queued up in the kernel while we were stopped and comes in as if it were new.
-  if (input.arm && demanded < Mode::vent && mode_ != Mode::fault && input.now_ns >= deaf_until_ns_)
+  // Arming applies to what the operator sees now. It is never kept until a cause is gone, and an
+  // `arm` queued in the kernel while the daemon was stopped, which looks new, does not count.
+  if (input.requests.arm && demanded < Mode::vent && mode_ != Mode::fault &&
+      input.now_ns >= deaf_until_ns_)
     armed_ = true;
-  if (input.disarm || input.shutdown) armed_ = false;
+  if (input.requests.disarm || input.requests.shutdown) armed_ = false;
 }
 
 void SafetyMonitor::enter(const CauseRule& cause) noexcept {
-  // With automatic arming a vent gives the arming back by itself, but not to an arm that ran beyond
-  // its limits (it would do so again and again), nor against a person's will.
+  // With automatic arming the arm stays armed after a vent, unless it exceeded its limits (it would
+  // do so again and again) or an operator disarmed it.
   if (cause.demands >= Mode::vent && cause.clearance != Clearance::good_frames) armed_ = false;
   mode_ = cause.demands;
   reason_ = cause.reason;
@@ -233,7 +227,7 @@ Mode SafetyMonitor::step(const SafetyInput& input) noexcept {
   note_stop(input);
   const CauseRule worst = worst_cause(input);
   take_operator_requests(input, worst.demands);
-  // In WAIT_FRAMES too, which such a cause does not leave.
+  // This applies in WAIT_FRAMES too, although such a cause does not change that mode.
   if (worst.demands >= Mode::vent && settings_.arming == Arming::explicit_) armed_ = false;
   previous_tick_ns_ = input.now_ns;
   if (mode_ == Mode::init) {
@@ -241,10 +235,11 @@ Mode SafetyMonitor::step(const SafetyInput& input) noexcept {
     reason_ = Reason::waiting_for_frames;
   }
 
-  // A run of good frames is one without a cause, a rejection, a gap or silent valves, and begins
-  // anew with the arm vented (until then it is moving), and when what queued up is through.
+  // A run of good frames is one without a cause, a rejection, a gap or silent valves, and starts
+  // again when the arm is vented (until then it is moving) and when queued messages have been
+  // handled.
   const bool still_venting = mode_ >= Mode::vent && !input.fully_vented;
-  const bool unheard = settings_.valve_readback && listening_since_ns_ != SafetyInput::kNever &&
+  const bool unheard = settings_.valve_readback && listening_since_ns_ != kNever &&
                        input.newest_measurement_ns <= listening_since_ns_;
   const bool deaf = input.now_ns < deaf_until_ns_;
   if (worst.demands > Mode::active || input.bad_frames > 0 || still_venting || unheard || deaf) {
@@ -280,9 +275,9 @@ Mode SafetyMonitor::step(const SafetyInput& input) noexcept {
       break;
     case Mode::fault:
       // Disarming acknowledges a fault whose cause has gone; the arm stays vented until it is armed
-      // again. An emergency stop is told even where a fault came before it.
+      // again. An emergency stop is reported even if a fault came before it.
       if (worst.reason == Reason::emergency_stop || worst.clearance == Clearance::never ||
-          (input.disarm && worst.demands < Mode::fault))
+          (input.requests.disarm && worst.demands < Mode::fault))
         enter(worst);
       break;
   }

@@ -1,23 +1,13 @@
 #include "simulation/arkode_integrator.hpp"
 
 #include <arkode/arkode_arkstep.h>
-#include <nvector/nvector_serial.h>
 
 #include <algorithm>
-#include <cstdlib>
 #include <numbers>
 #include <stdexcept>
 
 namespace softarm {
 namespace {
-
-constexpr long kMaxSteps = 1'000'000;  // in one call to advance
-// A step in the torque of a stiff arm asks for steps that are shorter by orders of magnitude.
-constexpr int kMaxErrorTestFailures = 40;
-constexpr double kMinStep_s = 1e-12;  // what needs less is not a motion of an arm
-
-SUNNonlinearSolver_Type solver_type(SUNNonlinearSolver) { return SUNNONLINEARSOLVER_ROOTFIND; }
-int ignore_system(SUNNonlinearSolver, SUNNonlinSolSysFn) { return SUN_NLS_SUCCESS; }
 
 /// ARKODE leaves a stage at a tenth of the tolerance. What is left is no noise: it points the same
 /// way in every step, and no error estimate sees it. Where one step a millisecond is far more exact
@@ -40,37 +30,12 @@ ARKodeButcherTable alexander2() {
 
 }  // namespace
 
-// y' explicitly. For the implicit methods only asked for at a (re)start: stages are solved through
-// the residual.
-int ArkodeIntegrator::derivative(double t_s, N_Vector y, N_Vector y_dot, void* user) {
-  auto& self = *static_cast<ArkodeIntegrator*>(user);
-  const double* state = N_VGetArrayPointer(y);
-  double* rate = N_VGetArrayPointer(y_dot);
-  const Eigen::Index n = self.size_;
-  const ConstMap x(state, n);
-  const ConstMap v(state + n, n);
-  Map(rate, n) = v;
-  if (!self.system_.acceleration(t_s, x, v, Map(rate + n, n))) {
-    return 1;  // recoverable: a smaller step may stay where B is positive definite
-  }
-  if (self.energy_) {
-    const auto powers = self.system_.powers(t_s, x, v);
-    rate[2 * n] = powers.supplied_w;
-    rate[2 * n + 1] = powers.dissipated_w;
-  }
-  return 0;
-}
-
 // One implicit stage z = s + gamma f(t, z), where s is what ARKODE calls its prediction plus data.
 int ArkodeIntegrator::solve_stage(SUNNonlinearSolver solver, N_Vector, N_Vector correction,
                                   N_Vector weights, double tolerance, int, void*) {
-  auto& self = *static_cast<ArkodeIntegrator*>(solver->content);
-  double t_s = 0.0;
-  double gamma = 0.0;
-  N_Vector predicted = nullptr;
-  N_Vector stage = nullptr;
-  N_Vector rate = nullptr;
-  N_Vector given = nullptr;
+  auto& self = static_cast<ArkodeIntegrator&>(of(solver->content));
+  double t_s = 0.0, gamma = 0.0;
+  N_Vector predicted = nullptr, stage = nullptr, rate = nullptr, given = nullptr;
   void* user = nullptr;
   if (ARKStepGetNonlinearSystemData(self.arkode_, &t_s, &predicted, &stage, &rate, &gamma, &given,
                                     &user) != ARK_SUCCESS) {
@@ -79,28 +44,22 @@ int ArkodeIntegrator::solve_stage(SUNNonlinearSolver solver, N_Vector, N_Vector 
   const double* prediction = N_VGetArrayPointer(predicted);
   self.s_ =
       ConstMap(prediction, self.length()) + ConstMap(N_VGetArrayPointer(given), self.length());
-  return self.stages_.correct(t_s, gamma, self.s_, prediction, N_VGetArrayPointer(weights),
-                              tolerance, nullptr, self.energy_, N_VGetArrayPointer(correction))
-             ? SUN_NLS_SUCCESS
-             : SUN_NLS_CONV_RECVR;
-}
-
-void ArkodeIntegrator::keep_message(int, const char*, const char*, char* text, void* self) {
-  static_cast<ArkodeIntegrator*>(self)->message_ = text;
+  return self.correct(t_s, gamma, prediction, weights, tolerance, nullptr, correction);
 }
 
 ArkodeIntegrator::ArkodeIntegrator(SecondOrderSystem& system, const IntegratorSettings& settings)
-    : Integrator(system, settings), stages_(system) {
-  s_.setZero(length());
+    : Integrator(system, settings) {
   acceleration_.setZero(size_);
+  // y' explicitly; for the implicit methods only asked for at a (re)start: stages are solved
+  // through the residual.
   const bool explicit_method = settings.method == IntegratorMethod::erk;
   arkode_ = ARKStepCreate(explicit_method ? derivative : nullptr,
                           explicit_method ? nullptr : derivative, 0.0, y_.get(), context_.get());
   if (arkode_ == nullptr) {
     throw std::runtime_error("plant: ARKStepCreate refused");
   }
-  check(ARKStepSetErrHandlerFn(arkode_, keep_message, this), "ARKStepSetErrHandlerFn");
-  check(ARKStepSetUserData(arkode_, this), "ARKStepSetUserData");
+  check(ARKStepSetErrHandlerFn(arkode_, keep_message, self()), "ARKStepSetErrHandlerFn");
+  check(ARKStepSetUserData(arkode_, self()), "ARKStepSetUserData");
   check(ARKStepSVtolerances(arkode_, settings.relative_tolerance, tolerances_.get()),
         "ARKStepSVtolerances");
   set_method();
@@ -133,20 +92,12 @@ void ArkodeIntegrator::set_method() {
   stages_.accept_stalled(1e-2);
   check(ARKStepSetNonlinConvCoef(arkode_, stage_tolerance(settings_.relative_tolerance)),
         "ARKStepSetNonlinConvCoef");
-  solver_ = SUNNonlinSolNewEmpty(context_.get());
-  solver_->content = this;
-  solver_->ops->gettype = solver_type;
-  solver_->ops->solve = solve_stage;
-  solver_->ops->setsysfn = ignore_system;
-  check(ARKStepSetNonlinearSolver(arkode_, solver_), "ARKStepSetNonlinearSolver");
+  check(ARKStepSetNonlinearSolver(arkode_, make_solver(solve_stage)), "ARKStepSetNonlinearSolver");
   // The stage solver knows x'' of a stage: no second evaluation to find out.
   check(ARKStepSetDeduceImplicitRhs(arkode_, 1), "ARKStepSetDeduceImplicitRhs");
 }
 
-ArkodeIntegrator::~ArkodeIntegrator() {
-  ARKStepFree(&arkode_);
-  if (solver_ != nullptr) SUNNonlinSolFreeEmpty(solver_);
-}
+ArkodeIntegrator::~ArkodeIntegrator() { ARKStepFree(&arkode_); }
 
 void ArkodeIntegrator::restart(double t_s, double first_step_s) {
   check(ARKStepSetInitStep(arkode_, first_step_s), "ARKStepSetInitStep");
@@ -163,29 +114,19 @@ int ArkodeIntegrator::evolve(double t_end_s, double* reached_s) {
 }
 
 std::string ArkodeIntegrator::flag_name(int flag) const {
-  char* name = ARKStepGetReturnFlagName(flag);
-  std::string text = name != nullptr ? name : "ARK_UNKNOWN";
-  std::free(name);
-  return text;
+  return owned_text(ARKStepGetReturnFlagName(flag));
 }
 
 IntegratorCounters ArkodeIntegrator::counters() const {
-  IntegratorCounters counters;
-  long steps = 0;
-  long rejected = 0;
+  long steps = 0, rejected = 0, explicit_calls = 0, implicit_calls = 0;
   ARKStepGetNumSteps(arkode_, &steps);
   ARKStepGetNumErrTestFails(arkode_, &rejected);
-  counters.steps = steps;
-  counters.rejected_steps = rejected;
-  counters.residual_evaluations = stages_.iterations();
-  counters.linearizations = stages_.linearizations();
-  counters.retries = retries_;
-  if (settings_.method == IntegratorMethod::erk) {
-    long explicit_calls = 0, implicit_calls = 0;
-    ARKStepGetNumRhsEvals(arkode_, &explicit_calls, &implicit_calls);
-    counters.residual_evaluations = explicit_calls;
-  }
-  return counters;
+  ARKStepGetNumRhsEvals(arkode_, &explicit_calls, &implicit_calls);
+  return {.steps = steps,
+          .rejected_steps = rejected,
+          .residual_evaluations = explicit_calls + stages_.iterations(),
+          .linearizations = stages_.linearizations(),
+          .retries = retries_};
 }
 
 }  // namespace softarm

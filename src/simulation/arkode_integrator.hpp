@@ -1,10 +1,7 @@
 // ARKODE's one-step methods on a second-order system in residual form.
 #pragma once
 
-#include <sundials/sundials_nonlinearsolver.h>
-
 #include "simulation/integrator.hpp"
-#include "simulation/stage_solver.hpp"
 
 namespace softarm {
 
@@ -29,15 +26,11 @@ class ArkodeIntegrator final : public Integrator {
   std::string flag_name(int flag) const override;
   void set_method();
 
-  static int derivative(double t_s, N_Vector y, N_Vector y_dot, void* self);
   static int solve_stage(SUNNonlinearSolver solver, N_Vector y, N_Vector correction,
                          N_Vector weights, double tolerance, int, void*);
-  static void keep_message(int, const char*, const char*, char* text, void* self);
 
-  StageSolver stages_;
-  SUNNonlinearSolver solver_ = nullptr;
   void* arkode_ = nullptr;
-  Eigen::VectorXd s_, acceleration_;
+  Eigen::VectorXd acceleration_;
 };
 
 }  // namespace softarm

@@ -8,7 +8,8 @@
 #include <vector>
 
 #include "simulation/integrator.hpp"
-#include "simulation/plant_system.hpp"
+#include "softarm/actuation/input_map.hpp"
+#include "softarm/simulation/plant_system.hpp"
 
 namespace softarm {
 namespace {
@@ -17,14 +18,6 @@ void expect(bool holds, const std::string& expected, const std::string& got) {
   if (!holds) {
     throw std::invalid_argument("plant: expected " + expected + ", got " + got);
   }
-}
-
-int count_chambers(const ActuationSettings& actuation) {
-  std::size_t count = 0;
-  for (const auto& segment : actuation.segments) {
-    count += segment.size();
-  }
-  return static_cast<int>(count);
 }
 
 const PlantSettings& checked(const PlantSettings& settings) {
@@ -68,32 +61,6 @@ const PlantSettings& checked(const PlantSettings& settings) {
   return settings;
 }
 
-/// Columns -g (cos chi, sin chi) in the rows of the chamber's segment: pressures to generalized
-/// force of A_chamber.
-Eigen::MatrixXd chamber_map(const ActuationSettings& actuation) {
-  Eigen::MatrixXd map = Eigen::MatrixXd::Zero(
-      2 * static_cast<Eigen::Index>(actuation.segments.size()), count_chambers(actuation));
-  if (actuation.kind == ActuationKind::torque) {
-    for (Eigen::Index row = 0; row < map.rows(); row += 2) {
-      const auto& moments = actuation.segments[static_cast<std::size_t>(row / 2)];
-      map(row, row + 1) = moments[1].gain_nm_per_bar;  // A_chamber itself, but for a mismatch
-      map(row + 1, row) = -moments[0].gain_nm_per_bar;
-    }
-    return map;
-  }
-  Eigen::Index column = 0;
-  Eigen::Index row = 0;
-  for (const auto& segment : actuation.segments) {
-    for (const Chamber& chamber : segment) {
-      map(row, column) = -chamber.gain_nm_per_bar * std::cos(chamber.angle_rad);
-      map(row + 1, column) = -chamber.gain_nm_per_bar * std::sin(chamber.angle_rad);
-      ++column;
-    }
-    row += 2;
-  }
-  return map;
-}
-
 IntegratorSettings integrator_settings(const PlantSettings& settings) {
   return {.method = settings.method,
           .relative_tolerance = settings.relative_tolerance,
@@ -110,10 +77,10 @@ struct ArmPlant::Implementation {
       : arm(checked(settings).arm),
         lag_s(settings.valves.lag_s),
         dead_time_s(settings.valves.dead_time_s),
-        valves(settings.valves, count_chambers(settings.actuation),
+        valves(settings.valves, chamber_count(settings.actuation),
                settings.actuation.kind == ActuationKind::torque),
-        map(chamber_map(settings.actuation)),
-        system(make_plant_system(settings)),
+        map(input_map(settings.actuation)),
+        system(settings.kind.make(settings)),
         integrator(make_integrator(*system, integrator_settings(settings))),
         present_nm(Eigen::VectorXd::Zero(arm.dof())),
         target_nm(Eigen::VectorXd::Zero(arm.dof())),
@@ -129,7 +96,7 @@ struct ArmPlant::Implementation {
     integrator->reset(0.0, x, Eigen::VectorXd::Zero(x.size()));
   }
 
-  /// Tells the equation of motion what the valves will do from now on.
+  /// Passes what the valves will do from now on to the equation of motion.
   void drive() {
     if (valves.slewed()) {
       system->input().follow(integrator->time_s(), valves, map);
@@ -153,15 +120,15 @@ struct ArmPlant::Implementation {
       valves.command(pending.front().command_bar);
       pending.pop_front();
     }
-    jumped |= system->surroundings().enter(now);
+    jumped |= system->external_loads().enter(now);
   }
 
   Eigen::Vector3d displacement_m() const {
-    return system->surroundings().base_displacement_m(integrator->time_s());
+    return system->external_loads().base_displacement_m(integrator->time_s());
   }
 
   double next_event_s() const {
-    const double load_s = system->surroundings().until(integrator->time_s());
+    const double load_s = system->external_loads().until(integrator->time_s());
     return pending.empty() ? load_s : std::min(load_s, pending.front().due_s);
   }
 
@@ -179,7 +146,7 @@ struct ArmPlant::Implementation {
   std::unique_ptr<Integrator> integrator;
   Eigen::VectorXd present_nm, target_nm;
   Eigen::VectorXd driven_nm;  // the torque of the last call without a lag
-  bool jumped = false;        // the input did, since the integrator was last told
+  bool jumped = false;        // since the last input_jumped()
   std::deque<PendingCommand> pending;
   mutable std::vector<Eigen::Isometry3d> ends;
 };
@@ -238,7 +205,7 @@ void ArmPlant::reset(ConstVectorRef u_rad, ConstVectorRef velocity_radps,
   Eigen::VectorXd x(self.system->size());
   Eigen::VectorXd v(self.system->size());
   self.system->spread(u_rad, x);
-  self.system->spread_rate(u_rad, velocity_radps, v);
+  self.system->spread(velocity_radps, v);
   self.integrator->reset(self.integrator->time_s(), x, v);
 }
 
@@ -283,7 +250,7 @@ Eigen::Isometry3d ArmPlant::base() const noexcept {
 
 void ArmPlant::segment_ends(std::span<Eigen::Isometry3d> segment_ends) const noexcept {
   implementation_->system->segment_ends(implementation_->integrator->x(), segment_ends);
-  if (implementation_->system->surroundings().base_moves()) {
+  if (implementation_->system->external_loads().base_moves()) {
     const Eigen::Vector3d displacement = implementation_->displacement_m();
     for (Eigen::Isometry3d& end : segment_ends) end.translation() += displacement;
   }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <sundials/sundials_context.h>
+#include <sundials/sundials_nonlinearsolver.h>
 #include <sundials/sundials_nvector.h>
 
 #include <Eigen/Core>
@@ -9,7 +10,8 @@
 #include <memory>
 #include <string>
 
-#include "simulation/second_order_system.hpp"
+#include "simulation/stage_solver.hpp"
+#include "softarm/simulation/second_order_system.hpp"
 #include "softarm/simulation/settings.hpp"
 
 namespace softarm {
@@ -34,7 +36,7 @@ class Integrator {
   Integrator(const Integrator&) = delete;
   Integrator& operator=(const Integrator&) = delete;
 
-  /// Starts anew from x, v at time t; both energies count from zero.
+  /// Starts again from x, v at time t; both energies count from zero.
   void reset(double t_s, SecondOrderSystem::ConstVector x, SecondOrderSystem::ConstVector v);
 
   /// Integrates up to t_end_s exactly; does nothing if that is not ahead. A failure is retried once
@@ -42,8 +44,8 @@ class Integrator {
   /// fails too; the state is then that of before the call.
   void advance(double t_end_s);
 
-  /// To be told when x'' jumps here and now. A multistep method then starts anew, a one-step method
-  /// has nothing to forget.
+  /// To be called when x'' jumps here and now. A multistep method then starts again, a one-step
+  /// method has nothing to forget.
   virtual void input_jumped() {}
 
   double time_s() const { return time_s_; }
@@ -62,15 +64,38 @@ class Integrator {
   /// @throw std::invalid_argument for tolerances that are not positive and finite.
   Integrator(SecondOrderSystem& system, const IntegratorSettings& settings);
 
-  /// Goes to t_end_s and returns the solver's flag, negative where it failed; in any case tells how
-  /// far it came.
+  /// Goes to t_end_s and returns the solver's flag, negative where it failed; in any case reports
+  /// how far it came.
   virtual int evolve(double t_end_s, double* reached_s) = 0;
   /// Forgets everything before t_s; the state is in `y_`. @param first_step_s 0: as the method
   /// likes.
   virtual void restart(double t_s, double first_step_s) = 0;
   virtual std::string flag_name(int flag) const = 0;
 
+  static constexpr long kMaxSteps = 1'000'000;  // in one call to advance
+  // A step in the torque of a stiff arm asks for steps that are shorter by orders of magnitude.
+  static constexpr int kMaxErrorTestFailures = 40;
+  static constexpr double kMinStep_s = 1e-12;  // what needs less is not a motion of an arm
+
   void check(int flag, const char* call) const;  ///< @throw std::runtime_error if refused
+
+  // What SUNDIALS calls back with, and from it this object again.
+  void* self() { return this; }
+  static Integrator& of(void* self) { return *static_cast<Integrator*>(self); }
+  static void keep_message(int, const char*, const char*, char* text, void* self);
+  /// y' from the explicit x''.
+  static int derivative(double t_s, N_Vector y, N_Vector rate, void* self);
+  /// The name of a flag, which SUNDIALS leaves to the caller to free.
+  static std::string owned_text(char* name);
+
+  /// In place of SUNDIALS' Newton iteration, with self() as its content. It solves the implicit
+  /// equation z = s + gamma f(t, z) of a step or stage with s in `s_`, by `correct`.
+  using Solve = int (*)(SUNNonlinearSolver, N_Vector, N_Vector, N_Vector, double, int, void*);
+  SUNNonlinearSolver make_solver(Solve solve);
+  /// StageSolver::correct as a SUNDIALS flag. @param guess of x'', or null: the last one found.
+  int correct(double t_s, double gamma_s, const double* prediction, N_Vector weights,
+              double tolerance, const double* guess, N_Vector correction);
+
   const double* data() const { return N_VGetArrayPointer(y_.get()); }
   double* data() { return N_VGetArrayPointer(y_.get()); }
   Eigen::Index length() const { return 2 * size_ + (energy_ ? 2 : 0); }
@@ -78,6 +103,7 @@ class Integrator {
   struct Free {
     void operator()(SUNContext context) const { SUNContext_Free(&context); }
     void operator()(N_Vector vector) const { N_VDestroy(vector); }
+    void operator()(SUNNonlinearSolver solver) const { SUNNonlinSolFreeEmpty(solver); }
   };
   using Context = std::unique_ptr<_SUNContext, Free>;
   using NVector = std::unique_ptr<_generic_N_Vector, Free>;
@@ -90,9 +116,12 @@ class Integrator {
   std::int64_t retries_ = 0;
   Context context_;
   NVector y_, tolerances_;
+  StageSolver stages_;
+  Eigen::VectorXd s_;
   std::string message_;  // the solver's last words
 
  private:
+  std::unique_ptr<_generic_SUNNonlinearSolver, Free> solver_;
   Eigen::VectorXd saved_;
 };
 

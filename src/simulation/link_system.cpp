@@ -5,6 +5,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "softarm/base/keys.hpp"
+
 namespace softarm {
 namespace {
 
@@ -33,9 +35,23 @@ inline LinkSystem::Vec3 LinkSystem::out_of(const Turn& t, const Vec3& v) {
   return {x, t.ca * v.y() - t.sa * z, t.sa * v.y() + t.ca * z};
 }
 
-LinkSystem::LinkSystem(const PlantSettings& settings)
-    : PlantSystem(settings.arm.size(), settings),
-      per_segment_(settings.links.links_per_segment),
+void LinkSettings::describe(Keys& key) {
+  key("links_per_segment", links_per_segment, from(1, kMaxLinksPerSegment),
+      "each with two crossed revolute joints at its start");
+  key("joints", joints, one_of({"crossed"}), "crossed: two angles, about x and y");
+  key("joint_stiffness_nm_per_rad", joint_stiffness_nm_per_rad, from(0, 1e6),
+      "of every joint about each axis; left out: k times links_per_segment");
+  key("joint_damping_nms_per_rad", joint_damping_nms_per_rad, from(0, 1e6),
+      "the same; left out: beta times links_per_segment");
+}
+
+std::unique_ptr<PlantSystem> LinkSettings::make(const PlantSettings& settings) const {
+  return std::make_unique<LinkSystem>(settings, *this);
+}
+
+LinkSystem::LinkSystem(const PlantSettings& settings, const LinkSettings& links)
+    : PlantSystem(settings),
+      per_segment_(links.links_per_segment),
       arm_(settings.arm),
       gravity_(arm_.base_rotation.transpose() * arm_.gravity_mps2) {
   if (per_segment_ < 1 || per_segment_ > kMaxLinksPerSegment) {
@@ -54,9 +70,9 @@ LinkSystem::LinkSystem(const PlantSettings& settings)
         .inertia_kgm2 = rod ? mass * length * length / 12.0 : 0.0,
         .payload_kg = 0.0,
         .stiffness_nm_per_rad =
-            settings.links.joint_stiffness_nm_per_rad.value_or(m * segment.stiffness_nm_per_rad),
+            links.joint_stiffness_nm_per_rad.value_or(m * segment.stiffness_nm_per_rad),
         .damping_nms_per_rad =
-            settings.links.joint_damping_nms_per_rad.value_or(m * segment.damping_nms_per_rad)};
+            links.joint_damping_nms_per_rad.value_or(m * segment.damping_nms_per_rad)};
     expect_not_negative(link.stiffness_nm_per_rad, "joint_stiffness_nm_per_rad");
     expect_not_negative(link.damping_nms_per_rad, "joint_damping_nms_per_rad");
     links_.insert(links_.end(), static_cast<std::size_t>(per_segment_), link);
@@ -83,7 +99,7 @@ LinkSystem::LinkSystem(const PlantSettings& settings)
   }
 }
 
-// All vectors are those of the inertial motion, told in the axes of the link at hand; gravity is an
+// All vectors are those of the inertial motion, in the axes of the link at hand; gravity is an
 // upward acceleration of the base.
 void LinkSystem::residual(double t_s, ConstVector x, ConstVector v, ConstVector a, Vector out) {
   const std::size_t count = links_.size();
@@ -118,7 +134,7 @@ void LinkSystem::residual(double t_s, ConstVector x, ConstVector v, ConstVector 
       moment_[j] += link.length_m * Vec3(-hung.y(), hung.x(), 0.0);
     }
   }
-  if (surroundings_.any_load_on()) subtract_loads(t_s);
+  if (external_loads_.any_load_on()) subtract_loads(t_s);
   Vec3 force = Vec3::Zero();
   Vec3 moment = Vec3::Zero();  // both that the link passes on, at its end
   for (std::size_t j = count; j-- > 0;) {
@@ -150,14 +166,14 @@ void LinkSystem::residual(double t_s, ConstVector x, ConstVector v, ConstVector 
 }
 
 LinkSystem::Vec3 LinkSystem::base_acceleration(double t_s) const {
-  if (!surroundings_.base_moves()) return Vec3::Zero();
-  return arm_.base_rotation.transpose() * surroundings_.base_acceleration_mps2(t_s);
+  if (!external_loads_.base_moves()) return Vec3::Zero();
+  return arm_.base_rotation.transpose() * external_loads_.base_acceleration_mps2(t_s);
 }
 
 void LinkSystem::subtract_loads(double t_s) {
-  for (const Surroundings::Load& load : surroundings_.loads()) {
+  for (const ExternalLoads::Load& load : external_loads_.loads()) {
     if (!load.on) continue;
-    const double scale = Surroundings::scale(load, t_s);
+    const double scale = ExternalLoads::scale(load, t_s);
     Vec3 force = scale * (arm_.base_rotation.transpose() * load.force_n);
     Vec3 moment = scale * (arm_.base_rotation.transpose() * load.moment_nm);
     const std::size_t end = last_link(load.segment);
@@ -192,7 +208,7 @@ void LinkSystem::place(ConstVector x) {
   }
 }
 
-// Composite rigid bodies, told in the base frame: B_ab is the power that the momentum of all that
+// Composite rigid bodies, in the base frame: B_ab is the power that the momentum of all that
 // angle b carries has on the motion of angle a, a being nearer the base.
 void LinkSystem::inertia(Matrix B) {
   double mass = 0.0;
@@ -272,9 +288,9 @@ void LinkSystem::add_input(double t_s, ConstVector x, Vector out) {
                         : tau[angle % 2];
     }
   }
-  for (const Surroundings::Load& load : surroundings_.loads()) {
+  for (const ExternalLoads::Load& load : external_loads_.loads()) {
     if (!load.on) continue;
-    const double scale = Surroundings::scale(load, t_s);
+    const double scale = ExternalLoads::scale(load, t_s);
     const std::size_t last = last_link(load.segment);
     const Vec3 end = origin_[last] + links_[last].length_m * rotation_[last].col(2);
     const Vec3 force = scale * (arm_.base_rotation.transpose() * load.force_n);
@@ -288,7 +304,7 @@ void LinkSystem::add_input(double t_s, ConstVector x, Vector out) {
 SecondOrderSystem::Powers LinkSystem::powers(double t_s, ConstVector x, ConstVector v) {
   scratch_.setZero();
   add_input(t_s, x, scratch_);
-  if (surroundings_.base_moves()) {
+  if (external_loads_.base_moves()) {
     inertia(inertia_);  // for the first moments that the angles carry
     scratch_.noalias() -= lever_.transpose() * base_acceleration(t_s);
   }
@@ -353,6 +369,23 @@ void LinkSystem::segment_ends(ConstVector x, std::span<Eigen::Isometry3d> ends) 
       ends[j / m].translation() = origin;
     }
   }
+}
+
+PlantShape LinkSystem::shape(ConstVector x) const {
+  Eigen::Isometry3d frame = Eigen::Isometry3d::Identity();
+  frame.linear() = arm_.base_rotation;
+  frame.translation() = arm_.base_position_m;
+  PlantShape shape{.bend_rad = x, .points_m = {frame.translation()}};
+  for (std::size_t j = 0; j < links_.size(); ++j) {
+    const auto k = static_cast<Eigen::Index>(2 * j);
+    shape.bend_rad[k] = x[k + 1];
+    shape.bend_rad[k + 1] = -x[k];
+    frame.rotate(Eigen::AngleAxisd(x[k], Vec3::UnitX()));
+    frame.rotate(Eigen::AngleAxisd(x[k + 1], Vec3::UnitY()));
+    frame.translate(links_[j].length_m * Vec3::UnitZ());
+    shape.points_m.emplace_back(frame.translation());
+  }
+  return shape;
 }
 
 void LinkSystem::curvature(ConstVector x, ConstVector v, Vector u, Vector rate) const {

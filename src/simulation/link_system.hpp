@@ -5,7 +5,7 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "simulation/plant_system.hpp"
+#include "softarm/simulation/plant_system.hpp"
 #include "softarm/simulation/settings.hpp"
 
 namespace softarm {
@@ -19,10 +19,10 @@ namespace softarm {
 /// A chamber's moment follows the body: tau_x and tau_y act on the two axes of every joint of the
 /// segment (the uniform internal moment). The paper's couple has fixed axes, x and y of the
 /// segment's start, and acts on the segment's last link and, reversed, on the one before its first.
-class LinkSystem : public PlantSystem {
+class LinkSystem final : public PlantSystem {
  public:
   /// @throw std::invalid_argument for a number of links, a stiffness or a damping that cannot be.
-  explicit LinkSystem(const PlantSettings& settings);
+  LinkSystem(const PlantSettings& settings, const LinkSettings& links);
 
   int size() const override { return 2 * static_cast<int>(links_.size()); }
   void residual(double t_s, ConstVector x, ConstVector v, ConstVector a, Vector out) override;
@@ -38,12 +38,7 @@ class LinkSystem : public PlantSystem {
   void spread(ConstVector u, Vector x) const override;
   void segment_ends(ConstVector x, std::span<Eigen::Isometry3d> ends) const override;
   void curvature(ConstVector x, ConstVector v, Vector u, Vector rate) const override;
-
- protected:
-  /// m l^2 / 3 of a link: what turning it about its start takes.
-  double turning_inertia_kgm2(std::size_t link) const {
-    return links_[link].mass_kg * links_[link].length_m * links_[link].length_m / 3.0;
-  }
+  PlantShape shape(ConstVector x) const override;
 
  private:
   struct Link {

@@ -40,7 +40,7 @@ bool LockStep::step(LogRow& row, bool logged) {
 
 void LockStep::fill(LogRow& row) const {
   fill_from_pipeline(pipeline_, model_, row);
-  row.t_s = 1e-9 * static_cast<double>(arm_.time_ns());
+  row.t_s = to_seconds(arm_.time_ns());
   row.truth = arm_.plant().u_rad();
   row.real = arm_.measured_pressures_bar();
   row.tip = arm_.plant().tip_m();

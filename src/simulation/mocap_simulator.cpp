@@ -4,6 +4,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "softarm/base/time.hpp"
+
 namespace softarm {
 namespace {
 
@@ -41,7 +43,7 @@ MocapSimulator::MocapSimulator(const MocapSettings& settings, int segments, std:
     : settings_(checked(settings, segments)),
       segments_(segments),
       start_ns_(start_ns),
-      latency_ns_(std::llround(settings.latency_s * 1e9)),
+      latency_ns_(to_ns(settings.latency_s)),
       next_capture_ns_(start_ns),
       noise_(seed, noise_stream),
       dropouts_(seed, dropout_stream),
@@ -49,7 +51,7 @@ MocapSimulator::MocapSimulator(const MocapSettings& settings, int segments, std:
 
 void MocapSimulator::schedule() noexcept {
   const double seconds = static_cast<double>(captured_) / settings_.rate_hz;
-  next_capture_ns_ = start_ns_ + std::llround(seconds * 1e9);
+  next_capture_ns_ = start_ns_ + to_ns(seconds);
 }
 
 BodyPose MocapSimulator::sense(const Eigen::Isometry3d& pose, bool noisy) noexcept {
@@ -112,7 +114,7 @@ void MocapSimulator::capture(const Eigen::Isometry3d& base,
 }
 
 std::int64_t MocapSimulator::next_arrival_ns() const noexcept {
-  return waiting_ == 0 ? kNever : queue_[oldest_].capture_ns + latency_ns_;
+  return waiting_ == 0 ? kForever : queue_[oldest_].capture_ns + latency_ns_;
 }
 
 bool MocapSimulator::receive(std::int64_t now_ns, MocapFrame& frame) noexcept {

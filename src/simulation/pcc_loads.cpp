@@ -22,13 +22,12 @@ PccLoads::PccLoads(const ArmParameters& arm, int pieces, const std::vector<doubl
   }
 }
 
-void PccLoads::add_external(const Surroundings& surroundings, double t_s, ConstVector u,
-                            Vector out) {
-  for (const Surroundings::Load& load : surroundings.loads()) {
+void PccLoads::add_external(const ExternalLoads& loads, double t_s, ConstVector u, Vector out) {
+  for (const ExternalLoads::Load& load : loads.loads()) {
     if (!load.on) continue;
     End& end = ends_[static_cast<std::size_t>(load.segment)];
     const Eigen::Index n = end.arm.dof();
-    const double scale = Surroundings::scale(load, t_s);
+    const double scale = ExternalLoads::scale(load, t_s);
     add_tip_force(end.arm, u.head(n), scale * load.force_n, out.head(n));
     if (load.moment_nm != Eigen::Vector3d::Zero()) {
       tip_angular_jacobian(end.arm, u.head(n), end.jacobian);

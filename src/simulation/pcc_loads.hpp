@@ -4,9 +4,9 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "simulation/second_order_system.hpp"
-#include "simulation/surroundings.hpp"
 #include "softarm/model/arm.hpp"
+#include "softarm/simulation/external_loads.hpp"
+#include "softarm/simulation/second_order_system.hpp"
 
 namespace softarm {
 
@@ -24,7 +24,7 @@ class PccLoads {
   bool has_payload() const { return has_payload_; }
 
   /// out += what the loads that are on do.
-  void add_external(const Surroundings& surroundings, double t_s, ConstVector u, Vector out);
+  void add_external(const ExternalLoads& loads, double t_s, ConstVector u, Vector out);
 
   /// out += m J' (J a + J' v - g).
   void add_payload(ConstVector u, ConstVector v, ConstVector a, const Eigen::Vector3d& gravity_mps2,

@@ -5,14 +5,19 @@
 #include "softarm/model/actuation_matrix.hpp"
 #include "softarm/model/kinematics.hpp"
 #include "softarm/model/segment.hpp"
+#include "softarm/model/statics.hpp"
 
 namespace softarm {
 
-PccSystem::PccSystem(const PlantSettings& settings)
-    : PlantSystem(settings.arm.size(), settings),
+std::unique_ptr<PlantSystem> PccSettings::make(const PlantSettings& settings) const {
+  return std::make_unique<PccSystem>(settings, settings.arm, 1);
+}
+
+PccSystem::PccSystem(const PlantSettings& settings, const ArmParameters& arm, int pieces)
+    : PlantSystem(settings),
       segments_(settings.arm.size()),
-      pieces_(settings.kind == PlantKind::refined ? settings.refined.pieces : 1),
-      arm_(pieces_of(settings)),
+      pieces_(pieces),
+      arm_(arm),
       share_(arm_.size()),
       gravity_mps2_(arm_.gravity_mps2),
       loads_(arm_, pieces_, settings.payload_kg),
@@ -48,8 +53,8 @@ void PccSystem::add_couple(const Eigen::Vector2d& tau_nm, int first_piece, Const
 }
 
 void PccSystem::feel_base(double t_s) {
-  if (surroundings_.base_moves()) {
-    arm_.gravity_mps2 = gravity_mps2_ - surroundings_.base_acceleration_mps2(t_s);
+  if (external_loads_.base_moves()) {
+    arm_.gravity_mps2 = gravity_mps2_ - external_loads_.base_acceleration_mps2(t_s);
   }
 }
 
@@ -69,8 +74,8 @@ void PccSystem::add_input(double t_s, ConstVector u, Vector out) {
       add_couple(input_.tau_nm(t_s, i), first, u, out);
     }
   }
-  if (surroundings_.any_load_on()) {
-    loads_.add_external(surroundings_, t_s, u, out);
+  if (external_loads_.any_load_on()) {
+    loads_.add_external(external_loads_, t_s, u, out);
   }
 }
 
@@ -125,12 +130,11 @@ void PccSystem::linearize(double t_s, ConstVector u, ConstVector velocity, Const
 SecondOrderSystem::Powers PccSystem::powers(double t_s, ConstVector u, ConstVector velocity) {
   sum_.setZero();
   add_input(t_s, u, sum_);
-  if (surroundings_.base_moves()) {
+  if (external_loads_.base_moves()) {
     // Inertia forces of the base's acceleration, the only weight in this.
-    arm_.gravity_mps2 = -surroundings_.base_acceleration_mps2(t_s);
+    arm_.gravity_mps2 = -external_loads_.base_acceleration_mps2(t_s);
     above_.setZero();
-    const DynamicsTerms weight = {.inertia = false, .coriolis = false, .gravity = true};
-    inverse_dynamics(arm_, workspace_, u, above_, above_, above_, weight, below_);
+    gravity_moments(arm_, workspace_, u, below_);
     if (loads_.has_payload()) loads_.add_payload(u, above_, above_, arm_.gravity_mps2, below_);
     sum_ -= below_;
   }

@@ -5,20 +5,20 @@
 #include <Eigen/Core>
 
 #include "simulation/pcc_loads.hpp"
-#include "simulation/plant_system.hpp"
 #include "softarm/model/dynamics.hpp"
+#include "softarm/simulation/plant_system.hpp"
 #include "softarm/simulation/settings.hpp"
 
 namespace softarm {
 
 /// r = B u'' + C u' + D u' + G + K u - A tau_A(t) - J' f_ext, where u are the curvatures of all
-/// pieces: `PlantKind::pcc` and `PlantKind::refined`. The moment of a segment's chambers follows
+/// pieces: the kinds pcc and refined. The moment of a segment's chambers follows
 /// the body and acts on each of its pieces alike; the paper's couple has fixed axes, those of the
 /// segment's start, and acts between there and the segment's end.
 class PccSystem final : public PlantSystem {
  public:
-  /// @throw std::invalid_argument for pieces that cannot be.
-  explicit PccSystem(const PlantSettings& settings);
+  /// @param arm of pieces, `pieces` a segment.
+  PccSystem(const PlantSettings& settings, const ArmParameters& arm, int pieces);
 
   int size() const override { return arm_.dof(); }
   void residual(double t_s, ConstVector u, ConstVector velocity, ConstVector acceleration,
@@ -33,6 +33,7 @@ class PccSystem final : public PlantSystem {
   void spread(ConstVector u, Vector x) const override;
   void segment_ends(ConstVector x, std::span<Eigen::Isometry3d> ends) const override;
   void curvature(ConstVector x, ConstVector v, Vector u, Vector rate) const override;
+  PlantShape shape(ConstVector x) const override { return arcs(arm_, x); }
 
  private:
   /// A base that accelerates is gravity the other way.
@@ -53,9 +54,5 @@ class PccSystem final : public PlantSystem {
   Eigen::MatrixXd coriolis_, inertia_;
   mutable std::vector<Eigen::Isometry3d> piece_ends_;
 };
-
-/// The arm of pieces that `settings` ask for: a segment is `refined.pieces` of them, one for
-/// `PlantKind::pcc`. @throw std::invalid_argument
-ArmParameters pieces_of(const PlantSettings& settings);
 
 }  // namespace softarm

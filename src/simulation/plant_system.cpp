@@ -1,81 +1,115 @@
-#include "simulation/plant_system.hpp"
+#include "softarm/simulation/plant_system.hpp"
 
-#include <algorithm>
-#include <cmath>
-#include <stdexcept>
-#include <string>
+#include <Eigen/Cholesky>
 
-#include "simulation/link_system.hpp"
-#include "simulation/pcc_system.hpp"
-#include "simulation/polar_link_system.hpp"
+#include "softarm/model/segment.hpp"
+#include "softarm/simulation/settings.hpp"
 
 namespace softarm {
 namespace {
 
-/// Weights as parts of one.
-std::vector<double> parts(const std::vector<double>& weights, int pieces, const char* key) {
-  if (weights.empty()) {
-    return std::vector<double>(static_cast<std::size_t>(pieces), 1.0 / pieces);
+// Central differences: step^2 and round-off / step balance near the cube root of the round-off.
+constexpr double kStep = 1e-5;
+
+/// Half the difference of `function` at x + step e_j and x - step e_j, over the step, for every j.
+template <class Function>
+void differences(const Eigen::VectorXd& x, double step, const Function& function,
+                 SecondOrderSystem::Matrix out) {
+  Eigen::VectorXd at = x, above(x.size()), below(x.size());
+  for (Eigen::Index j = 0; j < x.size(); ++j) {
+    at[j] = x[j] + step;
+    function(at, above);
+    at[j] = x[j] - step;
+    function(at, below);
+    at[j] = x[j];
+    out.col(j) = (above - below) / (2.0 * step);
   }
-  double sum = 0.0;
-  for (const double weight : weights) {
-    if (!std::isfinite(weight) || !(weight > 0.0)) {
-      throw std::invalid_argument(std::string("plant.refined.") + key +
-                                  ": expected weights > 0, got " + std::to_string(weight));
-    }
-    sum += weight;
-  }
-  if (static_cast<int>(weights.size()) != pieces) {
-    throw std::invalid_argument(std::string("plant.refined.") + key + ": expected " +
-                                std::to_string(pieces) + " weights, one a piece, got " +
-                                std::to_string(weights.size()));
-  }
-  std::vector<double> result = weights;
-  for (double& part : result) part /= sum;
-  return result;
 }
 
 }  // namespace
 
-ArmParameters pieces_of(const PlantSettings& settings) {
-  if (settings.kind != PlantKind::refined) {
-    return settings.arm;
-  }
-  const int pieces = settings.refined.pieces;
-  if (pieces < 1 || pieces * settings.arm.size() > kMaxSegments) {
-    throw std::invalid_argument("plant.refined.pieces: expected 1 to " +
-                                std::to_string(kMaxSegments) + " pieces in the whole arm of " +
-                                std::to_string(settings.arm.size()) + " segments, got " +
-                                std::to_string(pieces) + " a segment");
-  }
-  const auto length = parts(settings.refined.length_weights, pieces, "length_weights");
-  const auto mass = parts(settings.refined.mass_weights, pieces, "mass_weights");
-  const auto rigidity = parts(settings.refined.rigidity_weights, pieces, "rigidity_weights");
-  double compliance = 0.0;  // of the whole, in units in which E I / L is one where all are alike
-  for (std::size_t j = 0; j < length.size(); ++j) compliance += length[j] / rigidity[j];
-  ArmParameters arm = settings.arm;
-  arm.segments.clear();
-  for (const SegmentParameters& segment : settings.arm.segments) {
-    for (std::size_t j = 0; j < length.size(); ++j) {
-      const double stiffer = compliance * rigidity[j] / length[j];
-      arm.segments.push_back({.length_m = segment.length_m * length[j],
-                              .mass_kg = segment.mass_kg * mass[j],
-                              .stiffness_nm_per_rad = segment.stiffness_nm_per_rad * stiffer,
-                              .damping_nms_per_rad = segment.damping_nms_per_rad * stiffer,
-                              .radius_m = segment.radius_m});
-    }
-  }
-  return arm;
+PlantSystem::PlantSystem(const PlantSettings& settings)
+    : input_(2 * settings.arm.size()), external_loads_(settings), segments_arm_(settings.arm) {}
+
+bool PlantSystem::acceleration(double t_s, ConstVector x, ConstVector v, Vector a) {
+  const Eigen::VectorXd zero = Eigen::VectorXd::Zero(size());
+  Eigen::MatrixXd inertia(size(), size());
+  differences(
+      zero, 1.0, [&](const auto& at, auto& out) { residual(t_s, x, v, at, out); }, inertia);
+  Eigen::VectorXd bias(size());
+  residual(t_s, x, v, zero, bias);
+  const Eigen::LDLT<Eigen::MatrixXd> factors(inertia);
+  if (factors.info() != Eigen::Success || !factors.isPositive()) return false;
+  a = -factors.solve(bias);
+  return a.allFinite();
 }
 
-std::unique_ptr<PlantSystem> make_plant_system(const PlantSettings& settings) {
-  if (settings.kind == PlantKind::links && settings.links.joints == LinkJoints::polar) {
-    return std::make_unique<PolarLinkSystem>(settings);
+void PlantSystem::linearize(double t_s, ConstVector x, ConstVector v, ConstVector a, Matrix by_a,
+                            Matrix by_v, Matrix by_x) {
+  differences(
+      a, 1.0, [&](const auto& at, auto& out) { residual(t_s, x, v, at, out); }, by_a);
+  differences(
+      v, kStep, [&](const auto& at, auto& out) { residual(t_s, x, at, a, out); }, by_v);
+  differences(
+      x, kStep, [&](const auto& at, auto& out) { residual(t_s, at, v, a, out); }, by_x);
+}
+
+double PlantSystem::kinetic_energy_j(ConstVector x, ConstVector v) {
+  const Eigen::VectorXd zero = Eigen::VectorXd::Zero(size());
+  Eigen::VectorXd with(size()), without(size());
+  residual(0.0, x, zero, v, with);
+  residual(0.0, x, zero, zero, without);
+  return 0.5 * v.dot(with - without);  // r is linear in x'': the difference is B v
+}
+
+void PlantSystem::curvature(ConstVector x, ConstVector v, Vector u, Vector rate) const {
+  const auto n = static_cast<std::size_t>(segments_arm_.size());
+  std::vector<Eigen::Isometry3d> now(n), later(n), earlier(n);
+  segment_ends(x, now);
+  segment_ends(x + kStep * v, later);
+  segment_ends(x - kStep * v, earlier);
+  Eigen::Isometry3d start = Eigen::Isometry3d::Identity();
+  start.linear() = segments_arm_.base_rotation;
+  start.translation() = segments_arm_.base_position_m;
+  Eigen::Isometry3d start_later = start, start_earlier = start;
+  for (std::size_t i = 0; i < n; ++i) {
+    const Eigen::Isometry3d end = start.inverse() * now[i];
+    const Eigen::Matrix3d turn = (start_later.inverse() * later[i]).linear() *
+                                 (start_earlier.inverse() * earlier[i]).linear().transpose();
+    const Eigen::AngleAxisd turned(turn);
+    Eigen::Vector2d bend, bend_rate;
+    fit_segment(end.linear(), end.translation(), turned.angle() / (2.0 * kStep) * turned.axis(),
+                bend, bend_rate);
+    u.segment<2>(static_cast<Eigen::Index>(2 * i)) = bend;
+    rate.segment<2>(static_cast<Eigen::Index>(2 * i)) = bend_rate;
+    start = now[i];
+    start_later = later[i];
+    start_earlier = earlier[i];
   }
-  if (settings.kind == PlantKind::links) {
-    return std::make_unique<LinkSystem>(settings);
+}
+
+PlantShape PlantSystem::shape(ConstVector x) const {
+  Eigen::VectorXd u(segments_arm_.dof()), rate(segments_arm_.dof());
+  curvature(x, Eigen::VectorXd::Zero(x.size()), u, rate);
+  return arcs(segments_arm_, u);
+}
+
+PlantShape PlantSystem::arcs(const ArmParameters& arm, ConstVector u) {
+  constexpr int kPointsOfAnArc = 6;
+  Eigen::Isometry3d frame = Eigen::Isometry3d::Identity();
+  frame.linear() = arm.base_rotation;
+  frame.translation() = arm.base_position_m;
+  PlantShape shape{.bend_rad = u, .points_m = {frame.translation()}};
+  for (int i = 0; i < arm.size(); ++i) {
+    const double length_m = arm.segments[static_cast<std::size_t>(i)].length_m;
+    const Eigen::Vector2d bend = u.segment<2>(2 * i);
+    for (int k = 1; k <= kPointsOfAnArc; ++k)
+      shape.points_m.emplace_back(frame *
+                                  segment_point(length_m, bend, double(k) / kPointsOfAnArc));
+    frame.translate(segment_tip(length_m, bend));
+    frame.rotate(segment_rotation(bend));
   }
-  return std::make_unique<PccSystem>(settings);
+  return shape;
 }
 
 }  // namespace softarm

@@ -1,6 +1,6 @@
 #include <cmath>
 
-#include "simulation/plant_system.hpp"
+#include "softarm/simulation/plant_system.hpp"
 
 namespace softarm {
 

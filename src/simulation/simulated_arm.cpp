@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <span>
 
+#include "softarm/base/time.hpp"
+
 namespace softarm {
 namespace {
 
@@ -24,7 +26,7 @@ SimulatedArm::SimulatedArm(const PlantSettings& settings, std::int64_t start_ns,
 }
 
 void SimulatedArm::advance_plant(std::int64_t t_ns) {
-  plant_.advance(static_cast<double>(t_ns - start_ns_) * 1e-9);
+  plant_.advance(to_seconds(t_ns - start_ns_));
   now_ns_ = t_ns;
 }
 

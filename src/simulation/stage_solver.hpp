@@ -6,7 +6,7 @@
 #include <Eigen/LU>
 #include <cstdint>
 
-#include "simulation/second_order_system.hpp"
+#include "softarm/simulation/second_order_system.hpp"
 
 namespace softarm {
 
@@ -40,14 +40,14 @@ class StageSolver {
                const double* weights, double tolerance, const double* guess, bool energy,
                double* correction);
 
-  /// Forgets everything learnt: the next stage linearizes anew and guesses from `acceleration`.
+  /// Forgets everything: the next stage linearizes again and guesses from `acceleration`.
   void reset(SecondOrderSystem::ConstVector acceleration);
 
   /// A stage whose iteration stalls counts as solved below this norm of the correction. Default:
   /// none does.
   void accept_stalled(double tolerance) { stalled_tolerance_ = tolerance; }
 
-  /// The next stage linearizes anew.
+  /// The next stage linearizes again.
   void forget() { linearized_ = false; }
 
   const Eigen::VectorXd& x() const { return x_; }

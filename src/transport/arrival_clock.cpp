@@ -3,9 +3,6 @@
 #include <algorithm>
 
 namespace softarm {
-namespace {
-constexpr std::int64_t kLatestStamp_us = 4'000'000'000'000'000;  // nanoseconds must not overflow
-}  // namespace
 
 ArrivalClock::ArrivalClock(std::int64_t monotonic_ns, std::int64_t wall_ns) noexcept
     : look_ns_(monotonic_ns), wall_minus_ns_(wall_ns - monotonic_ns) {
@@ -22,7 +19,7 @@ void ArrivalClock::look(std::int64_t monotonic_ns, std::int64_t wall_ns) noexcep
 std::int64_t ArrivalClock::arrival_ns(std::int64_t stamp_us) noexcept {
   const std::int64_t earliest_ns = std::max(newest_ns_, look_before_ns_ - kLongestWait_ns);
   std::int64_t arrival_ns = kNever;
-  if (stamp_us >= 0 && stamp_us < kLatestStamp_us)
+  if (is_time_us(stamp_us))
     for (const std::int64_t wall_minus_ns : {wall_minus_ns_, wall_minus_before_ns_}) {
       const std::int64_t candidate_ns = 1000 * stamp_us - wall_minus_ns;
       if (candidate_ns >= earliest_ns && candidate_ns <= look_ns_)

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "softarm/base/clock.hpp"
+#include "softarm/base/time.hpp"
 #include "softarm/runtime/settings.hpp"
 #include "softarm/transport/message_decoding.hpp"
 #include "softarm/transport/settings.hpp"
@@ -10,10 +12,11 @@
 namespace softarm {
 namespace {
 
-/// What may arrive between two ticks; more is dropped by LCM and counted as missing.
+/// Frames accepted between two ticks; LCM drops more, which then count as missing.
 constexpr int kFrameCapacity = TickRecorder::kMostFrames;
 constexpr int kOtherCapacity = 16;
-/// After so long a silence a sender of references or requests may begin its numbers anew.
+/// After a silence of this length a sender of references or requests may restart its sequence
+/// numbers.
 constexpr std::int64_t kNumberForgotten_ns = 500'000'000;
 
 }  // namespace
@@ -33,7 +36,7 @@ DaemonLink::DaemonLink(const PipelineSettings& settings, const TransportSettings
   if (!lcm_.tick_channel.empty()) recorder_.emplace(settings, provenance, shadow);
   frames_.resize(static_cast<std::size_t>(
       recorder_ ? std::min(kFrameCapacity, recorder_->frame_capacity()) : kFrameCapacity));
-  // Everything that grows is grown here, so that the loop never has to.
+  // All buffers are grown here, so that the loop never has to.
   for (auto* list : {&reference_message_.u_rad, &reference_message_.velocity_radps,
                      &reference_message_.acceleration_radps2})
     list->reserve(2 * kMaxSegments);
@@ -70,7 +73,7 @@ TickInput DaemonLink::collect(std::int64_t now_ns) noexcept {
   return input_;
 }
 
-/// What comes in while the queue is emptied belongs to this tick as well.
+/// Messages that come in while the queue is being emptied also belong to this tick.
 std::int64_t DaemonLink::arrival_ns(const ReceivedMessage& packet) const noexcept {
   return std::min(packet.arrival_ns, now_ns_);
 }
@@ -88,7 +91,7 @@ void DaemonLink::take_reference(const ReceivedMessage& packet) noexcept {
     ++malformed_;
     return;
   }
-  const bool forgotten = now_ns_ - newest_reference_ns_ > kNumberForgotten_ns;
+  const bool forgotten = age_ns(now_ns_, newest_reference_ns_) > kNumberForgotten_ns;
   if (reference_message_.sequence <= reference_sequence_ && !forgotten) return;
   reference_sequence_ = reference_message_.sequence;
   newest_reference_ns_ = now_ns_;
@@ -106,16 +109,16 @@ void DaemonLink::take_operator(const ReceivedMessage& packet) noexcept {
     return;
   }
   const bool newer = operator_message_.sequence > operator_sequence_ ||
-                     now_ns_ - newest_operator_ns_ > kNumberForgotten_ns;
+                     age_ns(now_ns_, newest_operator_ns_) > kNumberForgotten_ns;
   if (newer) operator_sequence_ = operator_message_.sequence;
   newest_operator_ns_ = now_ns_;
-  // Whoever wants the arm vented is right, whatever the number; so is a request nobody knows.
+  // A request to vent is obeyed whatever its sequence number; so is a request of an unknown kind.
   using Request = softarm_messages::operator_command_t;
   const bool arm = operator_message_.request == Request::ARM;
   const bool emergency = operator_message_.request == Request::EMERGENCY_STOP;
-  input_.emergency_stop |= emergency;
-  input_.disarm |= !arm && !emergency;
-  input_.arm |= arm && newer;
+  input_.requests.emergency_stop |= emergency;
+  input_.requests.disarm |= !arm && !emergency;
+  input_.requests.arm |= arm && newer;
 }
 
 void DaemonLink::take_measurement(const ReceivedMessage& packet) noexcept {
@@ -128,7 +131,7 @@ void DaemonLink::take_measurement(const ReceivedMessage& packet) noexcept {
   }
   newest_measurement_ns_ = arrival_ns(packet);
   std::copy(measured.begin(), measured.end(), measured_bar_.begin());
-  // What the valves measure answers to whoever commands them: not to a shadow.
+  // Measured pressures respond to the daemon that commands the valves, not to a shadow.
   if (messages_.pressure_command.shadow == 0) input_.measured_bar = &measured_bar_;
 }
 
@@ -159,7 +162,7 @@ void DaemonLink::publish_command(std::int64_t now_ns, const TickOutput& output) 
 }
 
 bool DaemonLink::command_expired(std::int64_t now_us) const noexcept {
-  return now_us - sent_us_ >= messages_.pressure_command.validity_us;
+  return sent_us_ == kNever || now_us - sent_us_ >= messages_.pressure_command.validity_us;
 }
 
 void DaemonLink::publish_status(std::int64_t now_ns, const ControlPipeline& pipeline,

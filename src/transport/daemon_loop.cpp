@@ -4,6 +4,7 @@
 
 #include "softarm/base/clock.hpp"
 #include "softarm/base/realtime.hpp"
+#include "softarm/base/time.hpp"
 
 namespace softarm {
 namespace {
@@ -11,7 +12,7 @@ namespace {
 /// Zero commands sent before leaving: one may be lost on the wire.
 constexpr int kLastCommands = 3;
 constexpr std::int64_t kRepeatPause_ns = 500'000;
-constexpr std::int64_t kManyMissed = 1'000'000;  // more are no worse, and fit an int
+constexpr std::int64_t kManyMissed = 1'000'000;  // a larger count means nothing new; fits an int
 
 }  // namespace
 
@@ -23,7 +24,7 @@ DaemonLoop::DaemonLoop(const PipelineSettings& settings, const TransportSettings
 
 void DaemonLoop::run(const std::function<bool()>& stop_requested,
                      const std::function<void(const Report&)>& after_tick) {
-  // Without SCHED_FIFO, or where it was refused, overruns say nothing about the daemon.
+  // Without SCHED_FIFO overruns are not evidence of a fault in the daemon.
   judge_overruns_ = runs_under_fifo();
   const std::int64_t start_ns = monotonic_now_ns();
   PeriodicDeadline deadline(pipeline_.period_ns(), start_ns);
@@ -46,13 +47,13 @@ void DaemonLoop::run(const std::function<bool()>& stop_requested,
     if (stopping && pipeline_.output().reason == Reason::shutdown && pipeline_.fully_vented())
       ++vented_commands;
   }
-  // What was sent only once, not all at once: a logger's queue is short.
+  // Repeats the records sent only once, a few at a time: a logger's queue is short.
   while (link_.repeat_record()) sleep_until_ns(monotonic_now_ns() + kRepeatPause_ns);
 }
 
 void DaemonLoop::tick(std::int64_t woken_ns, bool stopping) noexcept {
   TickInput input = link_.collect(woken_ns);
-  input.shutdown = stopping;
+  input.requests.shutdown = stopping;
   input.consecutive_overruns = judge_overruns_ ? missed_in_row_ : 0;
   const TickOutput& output = pipeline_.tick(input);
   const std::int64_t decided_ns = monotonic_now_ns();
@@ -63,8 +64,7 @@ void DaemonLoop::tick(std::int64_t woken_ns, bool stopping) noexcept {
   if (timing_.ticks % ticks_per_second_ == 0) link_.publish_timing(woken_ns, timing_);
   timing_.tick.add_ns(decided_ns - woken_ns);
   timing_.publish.add_ns(monotonic_now_ns() - decided_ns);
-  if (output.frame_age_s >= 0.0)
-    timing_.frame_age.add_ns(static_cast<std::int64_t>(1e9 * output.frame_age_s));
+  if (output.frame_age_s >= 0.0) timing_.frame_age.add_ns(to_ns(output.frame_age_s));
 }
 
 }  // namespace softarm

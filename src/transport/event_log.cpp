@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <stdexcept>
 #include <utility>
 
 namespace softarm {
@@ -19,9 +20,20 @@ std::uint64_t number_at(const std::byte* bytes, std::size_t size) {
   return value;
 }
 
+void put_number(std::uint64_t value, std::size_t size, std::byte*& to) {
+  for (std::size_t k = size; k-- > 0;) *to++ = static_cast<std::byte>(value >> (8 * k) & 0xff);
+}
+
 }  // namespace
 
-/// Reads on until `wanted` bytes lie behind the cursor, or the log ends; returns how many do.
+EventLogReader::EventLogReader(const std::filesystem::path& path)
+    : file_(path, std::ios::binary), stream_(file_) {
+  if (!file_ || std::filesystem::is_directory(path))
+    throw std::runtime_error("cannot read " + path.string() +
+                             ": is it an LCM log (softarm import, lcm-logger)?");
+}
+
+/// Reads until `wanted` bytes follow the cursor, or the log ends; returns how many follow it.
 std::size_t EventLogReader::available(std::size_t wanted) {
   while (buffer_.size() - at_ < wanted && stream_.good()) {
     buffer_.erase(buffer_.begin(), buffer_.begin() + static_cast<std::ptrdiff_t>(at_));
@@ -39,8 +51,8 @@ bool EventLogReader::sync_at(std::size_t offset) const {
   return std::equal(kSync.begin(), kSync.end(), buffer_.data() + at_ + offset);
 }
 
-/// Does another sync word begin within the `size` bytes behind the cursor, all of them in the
-/// buffer, even if it ends beyond them? Every byte is searched once, however often this is asked.
+/// Whether another sync word begins within the `size` bytes after the cursor (all in the buffer),
+/// even if it ends beyond them. Every byte is searched only once, however often this is called.
 bool EventLogReader::meets_sync(std::size_t size) {
   const auto offset_of = [this](std::int64_t log_position) {
     return static_cast<std::size_t>(log_position - base_);
@@ -56,7 +68,7 @@ bool EventLogReader::meets_sync(std::size_t size) {
   return found != end;
 }
 
-/// Size of the event at the cursor, or 0 where there is none to be believed.
+/// Size of the event at the cursor, or 0 if there is no acceptable one.
 std::size_t EventLogReader::believable_size() {
   if (available(kHeader) < kHeader || !sync_at(0)) return 0;
   const std::byte* header = buffer_.data() + at_;
@@ -117,6 +129,45 @@ bool EventLogReader::next(LogEvent& event) {
   event.data = {header + kHeader + channel, size - kHeader - channel};
   event_ = size;
   return true;
+}
+
+EventLogWriter::EventLogWriter(const std::filesystem::path& file)
+    : path_(file), file_(file, std::ios::binary | std::ios::trunc) {
+  if (!file_) throw std::runtime_error(path_.string() + ": expected a file that can be written");
+}
+
+void EventLogWriter::write(std::int64_t time_us, std::string_view channel,
+                           std::span<const std::byte> data) {
+  if (channel.empty() || channel.size() > EventLogReader::kLargestChannel ||
+      data.size() > EventLogReader::kLargestData)
+    throw std::invalid_argument(
+        "an event of a log: expected a channel of 1 to " +
+        std::to_string(EventLogReader::kLargestChannel) + " bytes and data of up to " +
+        std::to_string(EventLogReader::kLargestData) + ", got " + std::to_string(channel.size()) +
+        " and " + std::to_string(data.size()));
+  std::array<std::byte, kHeader> header;
+  std::byte* to = std::copy(kSync.begin(), kSync.end(), header.data());
+  put_number(static_cast<std::uint64_t>(number_++), 8, to);
+  put_number(static_cast<std::uint64_t>(time_us), 8, to);
+  put_number(channel.size(), 4, to);
+  put_number(data.size(), 4, to);
+  const auto put = [this](const void* bytes, std::size_t size) {
+    file_.write(static_cast<const char*>(bytes), static_cast<std::streamsize>(size));
+  };
+  put(header.data(), header.size());
+  put(channel.data(), channel.size());
+  put(data.data(), data.size());
+  check();
+}
+
+void EventLogWriter::close() {
+  file_.close();
+  check();
+}
+
+void EventLogWriter::check() {
+  if (!file_)
+    throw std::runtime_error(path_.string() + ": could not be written; is the disk full?");
 }
 
 }  // namespace softarm

@@ -2,12 +2,14 @@
 
 #include <cmath>
 
+#include "softarm/base/time.hpp"
+
 namespace softarm {
 
 FrameAssembler::FrameAssembler(int segments, bool fixed_base, double frame_period_s) noexcept
     : bodies_(static_cast<std::size_t>(segments) + 1),
       first_(fixed_base ? 1 : 0),
-      half_period_ns_(std::llround(0.5e9 * frame_period_s)) {}
+      half_period_ns_(to_ns(0.5 * frame_period_s)) {}
 
 void FrameAssembler::put(std::size_t body, const BodyPose& pose, std::int64_t stamp_us) noexcept {
   current_.body[body] = {true, stamp_us, pose};
@@ -61,7 +63,7 @@ FrameAssembler::Outcome FrameAssembler::add(std::size_t body, const BodyPose& po
 
 void FrameAssembler::set_capture_ns(std::int64_t capture_ns) noexcept {
   current_.capture_ns = capture_ns;
-  if (!under_way_) done_.capture_ns = capture_ns;  // done with its first body
+  if (!under_way_) done_.capture_ns = capture_ns;  // complete with its first body
 }
 
 bool FrameAssembler::take_done(MocapFrame& frame) noexcept {

@@ -15,7 +15,7 @@
 namespace softarm {
 namespace {
 
-/// LCM takes channel names for regular expressions; we mean them literally.
+/// LCM interprets channel names as regular expressions; ours are literal.
 std::string quoted(const std::string& channel) {
   std::string pattern;
   for (const char c : channel) {
@@ -47,13 +47,14 @@ void LcmNode::look_at_clocks() noexcept {
   arrivals_.look(now.monotonic_ns, now.wall_ns);
 }
 
-/// noexcept: nothing may unwind through LCM's C code, where it would leave a lock behind.
+/// noexcept: no exception may unwind through LCM's C code, which would leave a lock held.
 void LcmNode::dispatch(const lcm_recv_buf_t* packet, const char* /*channel*/, void* user) noexcept {
-  // A packet with an unterminated channel name has been seen to claim 2^32 - 1 bytes.
+  // A packet with an unterminated channel name has been observed to claim 2^32 - 1 bytes.
   if (packet->data == nullptr || packet->data_size > LcmNode::kLargestMessage) return;
   const auto& subscription = *static_cast<const Subscription*>(user);
   subscription.handler({.bytes = {static_cast<const std::byte*>(packet->data), packet->data_size},
-                        .arrival_ns = subscription.arrivals->arrival_ns(packet->recv_utime)});
+                        .arrival_ns = subscription.arrivals->arrival_ns(packet->recv_utime),
+                        .stamp_us = packet->recv_utime});
 }
 
 void LcmNode::subscribe(const std::string& channel, int capacity, Handler handler) {
@@ -76,8 +77,7 @@ int LcmNode::drain(int limit) noexcept {
 
 bool LcmNode::wait_until(std::int64_t deadline_ns) noexcept {
   // lcm_handle_timeout counts in milliseconds, which is too coarse for a plant in real time.
-  const std::int64_t left_ns = std::max<std::int64_t>(0, deadline_ns - monotonic_now_ns());
-  const timespec timeout{.tv_sec = left_ns / 1'000'000'000, .tv_nsec = left_ns % 1'000'000'000};
+  const timespec timeout = time_left(deadline_ns);
   pollfd descriptor{.fd = lcm_get_fileno(lcm_), .events = POLLIN, .revents = 0};
   if (ppoll(&descriptor, 1, &timeout, nullptr) <= 0) return false;
   look_at_clocks();

@@ -11,7 +11,7 @@ namespace softarm {
 namespace {
 
 constexpr std::size_t kHash = 8;
-constexpr std::size_t kLongestText = 256;             // of a version, of a build, its end included
+constexpr std::size_t kLongestText = 256;             // version or build text, terminator included
 constexpr std::size_t kBody = 4 + 1 + 3 * 8 + 4 * 8;  // of a frame
 
 /// A big-endian 16 or 32 bit length at `offset`; -1 where the bytes end before it.
@@ -33,8 +33,8 @@ std::int64_t length32_at(std::span<const std::byte> bytes, std::size_t offset) n
 /// A length within [0, limit], or -1.
 int bounded(int length, int limit) noexcept { return length <= limit ? length : -1; }
 
-/// Whether a text of `length` bytes, counted with its end, ends there and not before. LCM's decoder
-/// takes any byte for the end; its encoder writes up to the first 0.
+/// Whether a text of `length` bytes, terminator included, ends there and not before. LCM's decoder
+/// accepts any byte as the terminator; its encoder writes up to the first 0.
 bool text_at(std::span<const std::byte> bytes, std::size_t offset, std::int64_t length) noexcept {
   if (length < 1 || length > static_cast<std::int64_t>(kLongestText)) return false;
   const auto size = static_cast<std::size_t>(length);
@@ -51,8 +51,8 @@ bool decode_exactly(std::span<const std::byte> bytes, std::size_t expected,
              static_cast<int>(bytes.size());
 }
 
-/// A message whose only length is a 16 bit one after `fixed` bytes, followed by that many elements
-/// of `element` bytes.
+/// A message whose only length is a 16-bit number after `fixed` bytes, followed by that many
+/// elements of `element` bytes.
 template <class Message>
 bool decode_list(std::span<const std::byte> bytes, std::size_t fixed, std::size_t element,
                  int limit, Message& message) noexcept {
@@ -144,7 +144,7 @@ bool decode(std::span<const std::byte> bytes, softarm_messages::tick_record_t& m
 }
 
 bool decode(std::span<const std::byte> bytes, softarm_messages::valves_status_t& message) noexcept {
-  // Two lists of one length.
+  // Two lists of the same length.
   return decode_list(bytes, 3 * 8 + 2 * 1 + 2 + 7 * 4, 2 * 4, kMaxChambers, message);
 }
 

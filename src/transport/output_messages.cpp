@@ -49,7 +49,7 @@ OutputMessages::OutputMessages(const PipelineSettings& settings, const Provenanc
   const auto segments = static_cast<std::size_t>(settings.arm.size());
   const auto chambers = static_cast<std::size_t>(chamber_count(settings.actuation));
 
-  // Everything that grows is grown here, so that the loop never has to.
+  // All lists are grown here, so that the loop never has to.
   pressure_command.shadow = shadow ? 1 : 0;
   pressure_command.validity_us =
       static_cast<std::int32_t>(std::lround(1e6 * settings.safety.command_validity_s));

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "softarm/base/hash.hpp"
 #include "softarm/runtime/settings.hpp"
 #include "softarm/transport/lcm_node.hpp"
 
@@ -13,13 +14,6 @@ using softarm_messages::tick_frame_t;
 using softarm_messages::tick_record_t;
 
 constexpr std::size_t kDigest = 8;  ///< at the end of every record
-
-std::uint64_t fnv1a(std::span<const std::byte> bytes) noexcept {
-  std::uint64_t hash = 14695981039346656037ull;
-  for (const std::byte each : bytes)
-    hash = (hash ^ std::to_integer<std::uint64_t>(each)) * 1099511628211ull;
-  return hash;
-}
 
 void put_digest(std::span<std::byte> encoded) noexcept {
   std::uint64_t digest = fnv1a(encoded.first(encoded.size() - kDigest));
@@ -73,7 +67,7 @@ void get(const tick_frame_t& from, MocapFrame& frame) {
   }
 }
 
-/// A record that holds as much as one of this arm can hold, its lists with it.
+/// The largest possible record of this arm.
 tick_record_t largest_record(const PipelineSettings& settings, const std::string& build) {
   tick_record_t record{};
   const auto dof = static_cast<std::size_t>(settings.arm.dof());
@@ -89,7 +83,7 @@ tick_record_t largest_record(const PipelineSettings& settings, const std::string
   tick_frame_t frame{};
   put(MocapFrame{.segments = settings.arm.size(), .body = {}}, frame);
   const int left = LcmNode::kLargestMessage - record.getEncodedSize();
-  const int size = frame.getEncodedSize() - 8;  // without a hash of its own
+  const int size = frame.getEncodedSize() - 8;  // without the hash of a separate message
   record.num_frames =
       static_cast<std::int16_t>(std::clamp<int>(left / size, 1, TickRecorder::kMostFrames));
   record.frames.assign(static_cast<std::size_t>(record.num_frames), frame);
@@ -107,10 +101,11 @@ bool is_intact(std::span<const std::byte> encoded) noexcept {
 }
 
 void to_record(const TickInput& input, tick_record_t& record) {
-  // A new field of TickInput stops the build here: it belongs into lcmtypes/tick_record_t.lcm, into
-  // this function, into RecordedInput::from and into the size that decode() checks.
-  const auto& [now_ns, frames, reference, arm, disarm, emergency_stop, shutdown, command_expired,
-               consecutive_overruns, newest_measurement_ns, measured_bar, newest_go_ns] = input;
+  // A new field of TickInput breaks the build here: it must be added to lcmtypes/tick_record_t.lcm,
+  // to this function, to RecordedInput::from and to the size that decode() checks.
+  const auto& [now_ns, frames, reference, requests, command_expired, consecutive_overruns,
+               newest_measurement_ns, measured_bar, newest_go_ns] = input;
+  const auto& [arm, disarm, emergency_stop, shutdown] = requests;
   record.now_ns = now_ns;
   record.num_frames = static_cast<std::int16_t>(frames.size());
   if (record.frames.size() < frames.size()) record.frames.resize(frames.size());
@@ -154,10 +149,10 @@ const TickInput& RecordedInput::from(const tick_record_t& record) {
                   vector_of(record.acceleration_radps2, record.dimension)};
     input_.reference = &reference_;
   }
-  input_.arm = record.arm != 0;
-  input_.disarm = record.disarm != 0;
-  input_.emergency_stop = record.emergency_stop != 0;
-  input_.shutdown = record.shutdown != 0;
+  input_.requests = {.arm = record.arm != 0,
+                     .disarm = record.disarm != 0,
+                     .emergency_stop = record.emergency_stop != 0,
+                     .shutdown = record.shutdown != 0};
   input_.command_expired = record.command_expired != 0;
   input_.consecutive_overruns = record.consecutive_overruns;
   input_.newest_measurement_ns = record.newest_measurement_ns;

@@ -44,7 +44,7 @@ void ValvesLink::take(const ReceivedMessage& packet) noexcept {
   const auto& pressures = command_.pressure_bar;
   const std::size_t count = std::min(pressures.size(), pressure_bar_.size());
   std::copy_n(pressures.begin(), count, pressure_bar_.begin());
-  // A command for more chambers than ours must look wrong, not be cut to fit.
+  // A command for more chambers than ours must be refused, not cut to fit.
   const bool fits = pressures.size() == pressure_bar_.size();
   const CommandVerdict verdict = driver_.command(
       {.sequence = command_.sequence,
@@ -61,7 +61,8 @@ void ValvesLink::take_until(std::int64_t deadline_ns) noexcept {
 
 void ValvesLink::drain(bool take) noexcept {
   discarding_ = !take;
-  node_.drain(kCommandCapacity);  // what a queue holds; a flood must not hold us
+  node_.drain(
+      kCommandCapacity);  // the capacity of the queue: a flood of messages must not delay the loop
   discarding_ = false;
 }
 

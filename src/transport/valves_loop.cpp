@@ -1,11 +1,12 @@
 #include "softarm/transport/valves_loop.hpp"
 
 #include "softarm/base/clock.hpp"
+#include "softarm/base/time.hpp"
 
 namespace softarm {
 
 ValvesLoop::ValvesLoop(const LcmSettings& lcm, double rate_hz, ValveDriver& driver)
-    : driver_(driver), link_(lcm, driver), period_ns_(static_cast<std::int64_t>(1e9 / rate_hz)) {}
+    : driver_(driver), link_(lcm, driver), period_ns_(to_ns(1.0 / rate_hz)) {}
 
 bool ValvesLoop::run(const std::function<bool()>& stop_requested,
                      const std::function<void(const Report&)>& after_cycle) {

@@ -18,12 +18,14 @@
 #include <stdexcept>
 #include <string>
 
+#include "softarm/base/clock.hpp"
+
 namespace softarm {
 namespace {
 
-/// A request must be complete so soon after its first byte.
+/// A request must be complete within this time after its first byte.
 constexpr std::uint32_t kRequest_us = 20'000;
-/// Who is turned away has to be accepted first.
+/// A client has to be accepted before it can be refused.
 constexpr int kBacklog = 64;
 constexpr int kHeader = 7;  // of Modbus TCP, before the function code
 
@@ -35,7 +37,7 @@ struct Request {
 
 int word_at(const std::uint8_t* bytes) { return bytes[0] << 8 | bytes[1]; }
 
-/// libmodbus checks less than what a stranger may send.
+/// libmodbus does not check everything that an unknown client may send.
 Request parse(const std::uint8_t* query, int size, const RegisterBank& bank) {
   Request request{.function = query[kHeader]};
   if (request.function != MODBUS_FC_READ_HOLDING_REGISTERS &&
@@ -90,11 +92,7 @@ ModbusServer::~ModbusServer() {
 }
 
 int ModbusServer::poll_until(std::int64_t deadline_ns) noexcept {
-  timespec now{};
-  clock_gettime(CLOCK_MONOTONIC, &now);
-  const std::int64_t left_ns = std::max<std::int64_t>(
-      0, deadline_ns - (std::int64_t{now.tv_sec} * 1'000'000'000 + now.tv_nsec));
-  const timespec timeout{.tv_sec = left_ns / 1'000'000'000, .tv_nsec = left_ns % 1'000'000'000};
+  const timespec timeout = time_left(deadline_ns);
   std::array<pollfd, kMaxClients + 1> descriptors{};
   descriptors[0] = {.fd = listener_, .events = POLLIN, .revents = 0};
   for (std::size_t k = 0; k < clients_.size(); ++k)
@@ -113,7 +111,7 @@ bool ModbusServer::wait_until(std::int64_t deadline_ns) noexcept {
 void ModbusServer::accept_client() noexcept {
   const int socket = accept4(listener_, nullptr, nullptr, SOCK_CLOEXEC);
   if (socket < 0) return;
-  if (clients() == kMaxClients) {
+  if (static_cast<int>(clients_.size()) == kMaxClients) {
     ::close(socket);
     return;
   }

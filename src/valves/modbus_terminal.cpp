@@ -40,7 +40,7 @@ bool ModbusTerminal::connect() noexcept {
   close();
   set_response_timeout(connect_timeout_s_);
   open_ = modbus_connect(context_) == 0;
-  // What libmodbus leaves where no answer came in time.
+  // The errors that libmodbus sets when no answer came in time.
   if (!open_) error_ = errno == EINPROGRESS ? ETIMEDOUT : errno;
   set_response_timeout(response_timeout_s_);
   return open_;
@@ -54,7 +54,7 @@ void ModbusTerminal::close() noexcept {
 LinkResult ModbusTerminal::failed() noexcept {
   error_ = errno;
   if (error_ > MODBUS_ENOBASE && error_ <= EMBXGTAR) return LinkResult::exception_reply;
-  // What libmodbus finds wrong with an answer, such as that it belongs to an older question.
+  // The errors that libmodbus reports for a wrong answer, such as one to an earlier request.
   if (error_ == ETIMEDOUT || error_ > EMBXGTAR) return LinkResult::no_answer;
   return LinkResult::broken;
 }
@@ -63,7 +63,7 @@ LinkResult ModbusTerminal::write(int address, std::span<const std::uint16_t> wor
   if (!open_) return LinkResult::broken;
   while (!words.empty()) {
     const auto part = words.first(std::min<std::size_t>(words.size(), MODBUS_MAX_WRITE_REGISTERS));
-    modbus_flush(context_);  // an answer that came too late would be taken for this one's
+    modbus_flush(context_);  // a late answer would be taken for that to this request
     const int count = static_cast<int>(part.size());
     if (modbus_write_registers(context_, address, count, part.data()) != count) return failed();
     words = words.subspan(part.size());

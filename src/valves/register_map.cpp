@@ -122,7 +122,7 @@ std::string register_map_fault(const RegisterMap& map, std::span<const int> orde
 }
 
 std::uint16_t set_point_register(const RegisterMap& map, double bar, double max_bar) noexcept {
-  if (!(bar > 0.0)) return 0;  // not a number, too
+  if (!(bar > 0.0)) return 0;  // NaN, too
   if (!(max_bar > 0.0)) return 0;
   const double units = std::round(std::min(bar, max_bar) * map.units_per_bar);
   return static_cast<std::uint16_t>(std::min(units, kLargestWord));

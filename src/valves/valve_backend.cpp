@@ -11,7 +11,8 @@
 namespace softarm {
 namespace {
 
-/// By name. Built on first use: registrations of static storage come in any order.
+/// Factories by name. Built on first use, because static registrations are initialised in any
+/// order.
 std::map<std::string, ValveBackendFactory>& factories() {
   static std::map<std::string, ValveBackendFactory> all = {
       {"modbus", [](const ValveDriverSettings& settings, double max_pressure_bar) {
@@ -22,10 +23,9 @@ std::map<std::string, ValveBackendFactory>& factories() {
 
 }  // namespace
 
-ValveBackendRegistration::ValveBackendRegistration(const std::string& name,
-                                                   ValveBackendFactory make) {
+void add_valve_backend(const std::string& name, ValveBackendFactory make) {
   if (!factories().emplace(name, std::move(make)).second)
-    throw std::invalid_argument("two valve back ends of the name " + name);
+    throw std::invalid_argument("two valve back ends with the name " + name);
 }
 
 std::vector<std::string> valve_backend_names() {

@@ -52,13 +52,13 @@ bool ValveDriver::cycle(std::int64_t now_ns) noexcept {
       break;
     }
     case ValveAction::exchange:
-      // Held up since it was decided, it may come to hardware that has vented by itself.
+      // If the request was delayed since the decision, the hardware may have vented by itself.
       guard_.wake(clock_());
       measured = exchange(now_ns);
       break;
   }
   if (guard_.state() == ValveState::disconnected && backend_->is_open()) {
-    // Should it still listen, it vents at once, not by its time-out.
+    // If the hardware still receives, it vents at once instead of after its time-out.
     if (guard_.reason() != ValveReason::no_connection) backend_->write(zero_);
     backend_->close();
   }
@@ -74,7 +74,7 @@ bool ValveDriver::exchange(std::int64_t now_ns) noexcept {
     keep_error();
   } else if (!is_finite(newest_, zero_.size())) {
     result = LinkResult::no_answer;
-    std::strcpy(error_.data(), "pressures that are no numbers");
+    std::strcpy(error_.data(), "pressures that are not numbers");
   }
   guard_.exchanged(result, newest_, now_ns);
   if (result != LinkResult::ok) return false;

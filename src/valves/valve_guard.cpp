@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "softarm/base/time.hpp"
+
 namespace softarm {
 namespace {
 
@@ -11,10 +13,6 @@ constexpr std::int64_t kMostStarting_ns = 20'000'000'000;  // a VTEM loads its m
 constexpr std::int64_t kMostExceptions_ns = 1'000'000'000;
 constexpr double kGoodFor_s = 0.25;
 constexpr int kStartCycles = 3;
-
-std::int64_t to_ns(double seconds) {
-  return static_cast<std::int64_t>(std::llround(1e9 * seconds));
-}
 
 }  // namespace
 
@@ -55,7 +53,7 @@ ValveGuard::ValveGuard(const ValveGuardSettings& settings)
       backoff_ns_(first_backoff_ns_),
       must_see_zero_(settings.wait_for_zero),
       set_points_bar_(Eigen::VectorXd::Zero(settings.chambers)),
-      off_since_ns_(static_cast<std::size_t>(settings.chambers), kLongAgo) {}
+      off_since_ns_(static_cast<std::size_t>(settings.chambers), kNever) {}
 
 void ValveGuard::enter(ValveState state, ValveReason reason) noexcept {
   state_ = state;
@@ -76,7 +74,8 @@ void ValveGuard::disconnect(ValveReason reason, std::int64_t now_ns) noexcept {
 }
 
 void ValveGuard::degrade(ValveReason reason, int chamber) noexcept {
-  // A stuck valve would be found only by raising the pressure once more: someone has to look first.
+  // A stuck valve would be found only by raising the pressure again, so an operator has to look
+  // first.
   if (settings_.wait_for_zero || reason == ValveReason::stuck_valve) wait_for_zero();
   if (state_ != ValveState::degraded) ++counters_.times_degraded;
   good_cycles_ = 0;
@@ -85,11 +84,11 @@ void ValveGuard::degrade(ValveReason reason, int chamber) noexcept {
 }
 
 bool ValveGuard::wake(std::int64_t now_ns) noexcept {
-  bool gap = woken_ns_ != kLongAgo && now_ns - woken_ns_ > gap_ns_;
-  // However the time went by since the terminal answered last, it has vented by itself.
+  bool gap = woken_ns_ != kNever && now_ns - woken_ns_ > gap_ns_;
+  // The terminal has not answered for longer than its time-out, so it has vented by itself.
   gap |= state_ == ValveState::running && now_ns - answered_ns_ >= failsafe_ns_;
   woken_ns_ = now_ns;
-  // Without a connection no pressure is there to lose, and connecting itself takes time.
+  // Without a connection there is no pressure to lose, and connecting takes time.
   if (gap && (state_ == ValveState::running || state_ == ValveState::vented))
     degrade(ValveReason::time_gap, -1);
   return !gap;
@@ -111,13 +110,13 @@ ValveAction ValveGuard::next(std::int64_t now_ns) noexcept {
 
 void ValveGuard::wait_for_zero() noexcept {
   must_see_zero_ = true;
-  listening_since_ns_ = kLongAgo;
+  listening_since_ns_ = kNever;
 }
 
 void ValveGuard::update_running(std::int64_t now_ns) noexcept {
   const bool commanded = !expiry_.vented();
-  if (listening_since_ns_ == kLongAgo) listening_since_ns_ = now_ns;
-  // What we could not hear is no silence of the controller.
+  if (listening_since_ns_ == kNever) listening_since_ns_ = now_ns;
+  // Commands that could not be received do not count as silence of the controller.
   const bool silent = !commanded && now_ns - listening_since_ns_ >= validity_ns_;
   if (silent || (commanded && expiry_.set_points_bar().maxCoeff() <= 0.0)) must_see_zero_ = false;
   if (state_ != ValveState::vented && state_ != ValveState::running) return;
@@ -136,9 +135,7 @@ void ValveGuard::update_running(std::int64_t now_ns) noexcept {
 
 void ValveGuard::update_set_points(std::int64_t now_ns) noexcept {
   const double passed_s =
-      written_ns_ == kLongAgo
-          ? 0.0
-          : 1e-9 * static_cast<double>(std::min(now_ns - written_ns_, 2 * period_ns_));
+      written_ns_ == kNever ? 0.0 : to_seconds(std::min(now_ns - written_ns_, 2 * period_ns_));
   written_ns_ = now_ns;
   if (state_ != ValveState::running) return;
   const double rise_bar =
@@ -157,14 +154,14 @@ void ValveGuard::connected(bool success, std::int64_t now_ns) noexcept {
   ++counters_.connections;
   failures_ = 0;
   good_cycles_ = 0;
-  since_ns_ = now_ns;
   enter(ValveState::securing, ValveReason::none);
 }
 
 void ValveGuard::secured(LinkResult result, bool as_written, std::int64_t now_ns) noexcept {
   if (result == LinkResult::ok && as_written) {
-    since_ns_ = now_ns;
-    std::fill(off_since_ns_.begin(), off_since_ns_.end(), kLongAgo);
+    failures_ = 0;
+    starting_since_ns_ = now_ns;
+    std::fill(off_since_ns_.begin(), off_since_ns_.end(), kNever);
     return enter(ValveState::starting, ValveReason::not_ready);
   }
   counters_.exceptions += result == LinkResult::exception_reply;
@@ -178,19 +175,19 @@ void ValveGuard::secured(LinkResult result, bool as_written, std::int64_t now_ns
 }
 
 void ValveGuard::failed(LinkResult result, std::int64_t now_ns) noexcept {
-  // It may have been written although the answer is missing.
+  // It may have been written even if the answer is missing.
   if (set_points_bar_.maxCoeff() > 0.0) zero_confirmed_ = false;
   counters_.exceptions += result == LinkResult::exception_reply;
   counters_.no_answers += result == LinkResult::no_answer;
   counters_.broken += result == LinkResult::broken;
   if (result == LinkResult::broken) return disconnect(ValveReason::no_connection, now_ns);
   good_cycles_ = 0;
-  if (failures_++ == 0) since_ns_ = now_ns;
+  if (failures_++ == 0) failing_since_ns_ = now_ns;
   if (failures_ <= settings_.driver.tolerated_failures) return;
   if (result == LinkResult::no_answer) return disconnect(ValveReason::no_answer, now_ns);
-  // It answers, so zero may still reach it; a terminal that refuses that too is left to its own
+  // It answers, so zero may still reach it; a terminal that refuses zero too vents by its own
   // time-out.
-  if (now_ns - since_ns_ > kMostExceptions_ns)
+  if (now_ns - failing_since_ns_ > kMostExceptions_ns)
     return disconnect(ValveReason::exception_reply, now_ns);
   degrade(ValveReason::exception_reply, -1);
 }
@@ -212,8 +209,8 @@ int ValveGuard::stuck_chamber(const ReadBack& read_back, std::int64_t now_ns) no
     if (read_back.has_echo)
       off_bar = std::max(off_bar, std::abs(read_back.echo_bar[at] - set_points_bar_[at]));
     if (off_bar <= settings_.driver.stuck_bar) {
-      off_since_ns_[i] = kLongAgo;
-    } else if (off_since_ns_[i] == kLongAgo) {
+      off_since_ns_[i] = kNever;
+    } else if (off_since_ns_[i] == kNever) {
       off_since_ns_[i] = now_ns;
     } else if (now_ns - off_since_ns_[i] > stuck_after_ns_ && stuck < 0) {
       stuck = static_cast<int>(i);
@@ -227,7 +224,6 @@ void ValveGuard::exchanged(LinkResult result, const ReadBack& read_back,
   if (result != LinkResult::ok) return failed(result, now_ns);
   ++counters_.cycles;
   answered_ns_ = now_ns;
-  if (failures_ > 0) since_ns_ = now_ns;
   failures_ = 0;
   const bool zero = set_points_bar_.maxCoeff() <= 0.0;
   zero_confirmed_ = zero && (!read_back.has_echo ||
@@ -245,7 +241,7 @@ void ValveGuard::exchanged(LinkResult result, const ReadBack& read_back,
     if (wrong != ValveReason::none && wrong != ValveReason::stuck_valve) {
       reason_ = wrong;
       good_cycles_ = 0;
-      if (now_ns - since_ns_ > kMostStarting_ns) disconnect(wrong, now_ns);
+      if (now_ns - starting_since_ns_ > kMostStarting_ns) disconnect(wrong, now_ns);
     } else if (++good_cycles_ >= kStartCycles) {
       backoff_ns_ = first_backoff_ns_;
       enter(ValveState::vented, stopping_ ? ValveReason::shutdown : ValveReason::no_command);
@@ -254,12 +250,12 @@ void ValveGuard::exchanged(LinkResult result, const ReadBack& read_back,
   }
   if (wrong != ValveReason::none) return degrade(wrong, chamber);
   if (state_ != ValveState::degraded) {
-    chamber_ = stuck;  // where stuck valves are only reported
+    chamber_ = stuck;  // if stuck valves are only reported
     return;
   }
   // A valve that was stuck has to follow again before it counts as good.
   const bool follows = std::all_of(off_since_ns_.begin(), off_since_ns_.end(),
-                                   [](std::int64_t since) { return since == kLongAgo; });
+                                   [](std::int64_t since) { return since == kNever; });
   good_cycles_ = follows || reason_ != ValveReason::stuck_valve ? good_cycles_ + 1 : 0;
   if (good_cycles_ < good_cycles_needed_) return;
   chamber_ = -1;

@@ -97,9 +97,9 @@ void run_frames(std::span<const std::byte> input) {
     bench.now_ns += bench.pipeline.period_ns();
     TickInput tick;
     tick.now_ns = bench.now_ns;
-    tick.arm = (flags & kArm) != 0;
-    tick.disarm = (flags & kDisarm) != 0;
-    tick.emergency_stop = (flags & kStop) != 0;
+    tick.requests.arm = (flags & kArm) != 0;
+    tick.requests.disarm = (flags & kDisarm) != 0;
+    tick.requests.emergency_stop = (flags & kStop) != 0;
     MocapFrame frame;
     if ((flags & kFrame) != 0) {
       frame = take_frame(source, clock, bench.now_ns);

@@ -3,8 +3,8 @@
 #include <sstream>
 
 #include "fuzz/target.hpp"
-#include "integration/replay/recorded_log.hpp"
 #include "softarm/transport/event_log.hpp"
+#include "unit/recording/recorded_log.hpp"
 
 namespace softarm::test {
 namespace {

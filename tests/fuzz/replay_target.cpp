@@ -3,10 +3,10 @@
 #include <sstream>
 
 #include "fuzz/target.hpp"
-#include "integration/replay/recorded_log.hpp"
 #include "softarm/recording/replay.hpp"
 #include "softarm/transport/settings.hpp"
 #include "unit/config/config_files.hpp"
+#include "unit/recording/recorded_log.hpp"
 
 namespace softarm::test {
 namespace {

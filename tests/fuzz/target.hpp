@@ -46,6 +46,8 @@ inline std::string to_text(std::span<const std::byte> bytes) {
 
 void run_optitrack(std::span<const std::byte> input);
 std::vector<Bytes> optitrack_seeds();
+void run_mocap(std::span<const std::byte> input);
+std::vector<Bytes> mocap_seeds();
 void run_yaml(std::span<const std::byte> input);
 std::vector<Bytes> yaml_seeds();
 std::vector<std::string> yaml_words();

@@ -17,8 +17,8 @@ softarm check config/arm.yaml
 
 
 class CheckDocs(unittest.TestCase):
-    def check(self, page):
-        """Exit code and output of the check of a project with one page."""
+    def check(self, page, readme=None):
+        """Exit code and output of the check of a project with one page, and a README where there is one."""
         with tempfile.TemporaryDirectory() as name:
             root = pathlib.Path(name)
             (root / "config").mkdir()
@@ -26,12 +26,22 @@ class CheckDocs(unittest.TestCase):
             (root / "tests").mkdir()
             (root / "tests/some_test.cpp").write_text("TEST_F(Suite, Name) {}\n", encoding="utf-8")
             (root / "page.md").write_text(page, encoding="utf-8")
+            (root / "examples").mkdir()
+            (root / "examples/loop.cpp").write_text("int main() {\n  a();\n  b();\n}\n", encoding="utf-8")
+            if readme:
+                (root / "README.md").write_text(readme, encoding="utf-8")
             done = subprocess.run([sys.executable, "-B", CHECK, root], capture_output=True, text=True, check=False)
         return done.returncode, done.stdout
 
     def test_a_good_page_passes(self):
         code, printed = self.check(GOOD)
         self.assertEqual(code, 0, printed)
+
+    def test_cpp_in_the_readme_is_part_of_an_example(self):
+        self.assertEqual(self.check(GOOD, "```cpp\na();\nb();\n```\n")[0], 0)
+        code, printed = self.check(GOOD, "```cpp\na();\nc();\n```\n")
+        self.assertEqual(code, 1)
+        self.assertIn("no part of a program in examples/", printed)
 
     def test_every_fault_is_noticed(self):
         faults = {

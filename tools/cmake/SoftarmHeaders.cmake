@@ -21,14 +21,14 @@ function(softarm_precompile kind)
     # The compiler takes a precompiled header only where the macros in it are what they were, in files without fmt too.
     target_compile_definitions(${target} PRIVATE $<TARGET_PROPERTY:fmt::fmt,INTERFACE_COMPILE_DEFINITIONS>)
     if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
-      # g++ 12 takes "text" + std::string for an overlap (its bug 105651), and a precompiled header is no system header to it.
+      # g++ 12 takes "text" + std::string for an overlap (its bug 105651), and does not treat a precompiled header as a system header.
       target_compile_options(${target} PRIVATE -Wno-restrict)
     endif()
     target_precompile_headers(${target} REUSE_FROM ${owner})
   endforeach()
 endfunction()
 
-# A target that compiles the headers and nothing else, as its users are compiled: a library or an executable.
+# A target that only compiles the headers, with the flags of its users: a library or an executable.
 function(softarm_headers_owner kind owner)
   set(source ${PROJECT_BINARY_DIR}/generated/precompiled/${kind}.cpp)
   file(CONFIGURE OUTPUT ${source} CONTENT "int main() { return 0; }\n")

@@ -5,7 +5,7 @@ install(TARGETS ${modules} EXPORT softarmTargets ARCHIVE DESTINATION ${CMAKE_INS
 install(DIRECTORY include/softarm DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
 install(DIRECTORY ${SOFTARM_GENERATED_DIR}/lcmtypes/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} FILES_MATCHING PATTERN "*.hpp")
 install(DIRECTORY config/ DESTINATION ${CMAKE_INSTALL_DATADIR}/softarm/config FILES_MATCHING PATTERN "*.yaml"
-  PATTERN "systemd" EXCLUDE)
+  PATTERN "*.json" PATTERN "systemd" EXCLUDE)
 install(DIRECTORY lcmtypes/ DESTINATION ${CMAKE_INSTALL_DATADIR}/softarm/lcmtypes FILES_MATCHING PATTERN "*.lcm")
 install(EXPORT softarmTargets NAMESPACE softarm:: DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/softarm)
 configure_package_config_file(${CMAKE_CURRENT_LIST_DIR}/softarmConfig.cmake.in ${PROJECT_BINARY_DIR}/softarmConfig.cmake

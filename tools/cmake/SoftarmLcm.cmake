@@ -1,5 +1,5 @@
 # The target lcm::lcm, from LCM's own CMake config (1.4 and later: target `lcm`) or without one (Debian 12 ships none, and
-# its lcm.pc asks for a glib.pc that liblcm-dev does not bring). Used by our build and by the installed package.
+# its lcm.pc requires a glib.pc that is not in liblcm-dev). Used by our build and by the installed package.
 find_package(lcm CONFIG QUIET)
 if(NOT TARGET lcm::lcm)
   if(TARGET lcm)

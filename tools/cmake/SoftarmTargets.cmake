@@ -1,7 +1,7 @@
-# softarm_module(NAME DEPENDS libraries PRIVATE_DEPENDS libraries): a module of the tree, a library of its own, so that the linker
-# sees which way the arrows point too. softarm_program(NAME DEPENDS ...): an executable.
+# softarm_module(NAME DEPENDS libraries PRIVATE_DEPENDS libraries): a module of the tree as a separate library, so that the linker
+# checks the direction of the arrows too. softarm_program(NAME DEPENDS ...): an executable.
 # softarm_tests(LABEL MODULE [ALONE] [SLOW FILTER] DEPENDS ...): one test program from every *_test.cpp below the folder MODULE;
-# ALONE for tests in real time, which nothing may run beside; those whose names FILTER matches get the label slow instead.
+# ALONE for real-time tests, which must not run in parallel with others; those whose names FILTER matches get the label slow instead.
 
 include(SoftarmHeaders)
 
@@ -15,16 +15,15 @@ if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
   # The compiler collects garbage from 1 GB on instead of 128 MB: a fifth of the build's time.
   add_compile_options(--param=ggc-min-heapsize=1000000)
 endif()
-if(SOFTARM_NATIVE)
-  # g++ 12 takes its own AVX-512 intrinsics, undefined lanes and unused widths, for faults of ours.
-  add_compile_options(-march=native -Wno-error=maybe-uninitialized -Wno-error=array-bounds)
+if(SOFTARM_MARCH)
+  add_compile_options(-march=${SOFTARM_MARCH})
 endif()
 if(SOFTARM_SANITIZE)
   add_compile_options(-fsanitize=${SOFTARM_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all)
   add_link_options(-fsanitize=${SOFTARM_SANITIZE})
 endif()
 
-# softarm::NAME from the sources in src/NAME; the modules that it may include, and hence links, stand in src/modules.txt.
+# softarm::NAME from the sources in src/NAME; the modules that it may include, and therefore links, are in src/modules.txt.
 file(STRINGS ${PROJECT_SOURCE_DIR}/src/modules.txt SOFTARM_ARROWS REGEX "^[a-z]+:")
 set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/modules.txt)
 function(softarm_module name)
@@ -61,7 +60,7 @@ endfunction()
 # Only what is tested is optimised in full: a quarter of the tests' compile time.
 function(softarm_optimise_test target)
   if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
-    # At -O1 g++ 12 finds faults in Eigen and std::string that are none; in tests the sanitizers look for them.
+    # At -O1 g++ 12 reports false positives in Eigen and std::string; in tests the sanitizers look for them.
     target_compile_options(${target} PRIVATE $<$<NOT:$<CONFIG:Debug>>:-O1 -Wno-maybe-uninitialized -Wno-array-bounds -Wno-stringop-overflow>)
   endif()
 endfunction()

@@ -44,6 +44,7 @@ void add_bench_command(CLI::App& app) {
   CLI::App* group = app.add_subcommand("bench", "Measure how fast this machine is");
   group->require_subcommand(1);
   add_bench_control_commands(*group);
+  add_bench_robustness_command(*group);
   add_bench_plant_command(*group);
   add_bench_loop_command(*group);
   CLI::App* command = group->add_subcommand(

@@ -13,6 +13,10 @@ void add_bench_command(CLI::App& app);
 /// bench`
 void add_bench_control_commands(CLI::App& group);
 
+/// softarm-dev bench robustness [--json] [--seeds N] [--scene TEXT] [--law NAME]: added to
+/// `softarm-dev bench`
+void add_bench_robustness_command(CLI::App& group);
+
 /// softarm-dev bench plant [--json] [--duration S] [--rounds N]: added to `softarm-dev bench`
 void add_bench_plant_command(CLI::App& group);
 

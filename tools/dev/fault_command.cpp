@@ -15,6 +15,7 @@
 #include "dev/fault/hostile_packets.hpp"
 #include "dev/fault/raw_packets.hpp"
 #include "softarm/base/clock.hpp"
+#include "softarm/base/time.hpp"
 #include "softarm/config/load.hpp"
 #include "softarm/transport/settings.hpp"
 
@@ -58,7 +59,7 @@ void print_list() {
 }
 
 void wait_s(double time_s) {
-  const std::int64_t end_ns = monotonic_now_ns() + static_cast<std::int64_t>(1e9 * time_s);
+  const std::int64_t end_ns = monotonic_now_ns() + to_ns(time_s);
   while (stop_requested == 0 && monotonic_now_ns() < end_ns)
     sleep_until_ns(std::min(end_ns, monotonic_now_ns() + 50'000'000));
 }
@@ -68,7 +69,7 @@ void wait_s(double time_s) {
 void send_packets(const std::string& url, const std::vector<Packet>& packets, double for_s,
                   std::int64_t pause_ns) {
   RawSender sender(url);
-  const std::int64_t end_ns = monotonic_now_ns() + static_cast<std::int64_t>(1e9 * for_s);
+  const std::int64_t end_ns = monotonic_now_ns() + to_ns(for_s);
   std::int64_t sent = 0;
   while (stop_requested == 0 && monotonic_now_ns() < end_ns) {
     sent += sender.send(packets[static_cast<std::size_t>(sent) % packets.size()]) ? 1 : 0;
@@ -95,7 +96,7 @@ void send_malformed(const Experiment& experiment, long packets) {
     sleep_until_ns(now_ns + 1'000'000);
   }
   say(fmt::format("softarm-dev fault: {} packets sent in {:.1f} s\n", sent,
-                  1e-9 * static_cast<double>(monotonic_now_ns() - start_ns)));
+                  to_seconds(monotonic_now_ns() - start_ns)));
 }
 
 int pause_process(const FaultOptions& options) {
@@ -140,7 +141,7 @@ int make(const FaultOptions& options) {
     send_packets(lcm.url, {flooding_frame(lcm)}, options.for_s, 0);
     return kExitOk;
   }
-  if (experiment.transport.mocap.source != MocapSourceKind::softarm)
+  if (experiment.transport.mocap.source != softarm_mocap())
     throw ConfigError(options.config, 0, "daemon.mocap.source",
                       "softarm, the only frames that this program can spoil", "another source");
   Fault fault = options.fault == "none" ? Fault{} : *find_fault(options.fault);

@@ -141,8 +141,7 @@ def control(results, path):
 
 
 METHOD_STYLE = {"sdirk2": (CATEGORY[0], "o-"), "cash4": (CATEGORY[2], "s-"), "sdirk4": (CATEGORY[3], "^-"),
-                "erk": (CATEGORY[4], "v-"), "cvode_bdf": (CATEGORY[1], "o--"), "cvode_adams": (CATEGORY[6], "s--"),
-                "ida": (CATEGORY[5], "^--")}
+                "erk": (CATEGORY[4], "v-"), "cvode_bdf": (CATEGORY[1], "o--")}
 DEFAULT_STYLE = {"color": CATEGORY[0], "marker": "D", "markersize": 6, "linestyle": ""}
 PLAIN_STYLE = {"color": INK, "marker": "*", "markersize": 9, "linestyle": ""}  # the usual set-up
 

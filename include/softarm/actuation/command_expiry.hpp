@@ -1,13 +1,15 @@
-// Whose command is in force at the valves, real or simulated, and until when.
+// Which command is in force at the valves, real or simulated, and until when.
 #pragma once
 
 #include <Eigen/Core>
 #include <cstdint>
 #include <span>
 
+#include "softarm/base/time.hpp"
+
 namespace softarm {
 
-/// What the valve side makes of a command.
+/// Verdict of the valve side on a command.
 enum class CommandVerdict {
   in_force,   ///< its set points hold until a newer command comes or it expires
   older,      ///< its sequence number is not above that of the command in force
@@ -24,39 +26,45 @@ struct PressureCommand {
       pressure_bar;  ///< above ambient; segment by segment, in each the configured chamber order
 };
 
-/// Decides which command is in force, so that the arm vents by itself when its controller falls
-/// silent: no clock of its own, time comes in as an argument.
+/// The same rule for the sender: whether a command valid for `validity_us` from `sent_us` on has
+/// expired at `now_us`, so that the valves have vented unless another command arrived. All times
+/// are of one clock.
+constexpr bool has_expired(std::int64_t sent_us, std::int64_t validity_us,
+                           std::int64_t now_us) noexcept {
+  return now_us - sent_us >= validity_us;
+}
+
+/// Decides which command is in force, so that the arm vents by itself when its controller stops
+/// sending. Reads no clock: time is an argument.
 ///
 /// Before the first command and from the expiry of the last one on, every set point is 0 bar. After
-/// an expiry a sender may start its sequence numbers anew. Nothing allocates or throws after
+/// an expiry a sender may restart its sequence numbers. Nothing allocates or throws after
 /// construction.
 class CommandExpiry {
  public:
   static constexpr std::int64_t kNoSequence = -1;  ///< `sequence()` while vented
-  static constexpr std::int64_t kNever = INT64_MAX;
 
   /// @param chambers number of set points in a command, >= 0 (std::invalid_argument otherwise).
-  /// @param longest_ns what is valid for longer is so for this long only: a sender that mistakes a
-  /// unit must not hold the valves for minutes.
-  explicit CommandExpiry(int chambers, std::int64_t longest_ns = kNever);
+  /// @param longest_ns upper limit of a command's validity: a sender with a wrong unit must not
+  /// hold the valves for minutes.
+  explicit CommandExpiry(int chambers, std::int64_t longest_ns = kForever);
 
   /// Takes a command that arrived at `arrival_ns` (times never go back).
   CommandVerdict receive(const PressureCommand& command, std::int64_t arrival_ns) noexcept;
 
-  /// Lets a command expire whose validity ended at or before `now_ns`. Returns true if that vented
-  /// the valves just now.
+  /// Expires a command whose validity ended at or before `now_ns`. Returns true if this call vented
+  /// the valves.
   bool update(std::int64_t now_ns) noexcept;
 
-  bool vented() const noexcept { return expires_ns_ == kNever; }    ///< no command is in force
-  std::int64_t expires_ns() const noexcept { return expires_ns_; }  ///< kNever while vented
+  bool vented() const noexcept { return expires_ns_ == kForever; }  ///< no command is in force
+  std::int64_t expires_ns() const noexcept { return expires_ns_; }  ///< kForever while vented
   std::int64_t sequence() const noexcept { return sequence_; }      ///< of the command in force
-  const Eigen::VectorXd& set_points_bar() const noexcept {
-    return set_points_bar_;
-  }  ///< zero while vented
+  /// Set points in force, one per chamber (bar); zero while vented.
+  const Eigen::VectorXd& set_points_bar() const noexcept { return set_points_bar_; }
 
  private:
   std::int64_t longest_ns_;
-  std::int64_t expires_ns_ = kNever;
+  std::int64_t expires_ns_ = kForever;
   std::int64_t sequence_ = kNoSequence;
   Eigen::VectorXd set_points_bar_;
 };

@@ -16,14 +16,14 @@ namespace softarm {
 inline constexpr int kMaxChambersPerSegment = 8;
 inline constexpr int kMaxChambers = kMaxChambersPerSegment * kMaxSegments;
 
-/// One pressure a chamber (bar), segment after segment in the order of the valves. Storage in
-/// place: never allocates.
+/// One pressure per chamber (bar), segment by segment in the order of the valves. Storage in place:
+/// never allocates.
 using PressureVector = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, kMaxChambers, 1>;
-/// One number a segment.
+/// One number per segment.
 using SegmentScalars = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, kMaxSegments, 1>;
 
-/// The chambers of one segment: which tau_A they reach, and the pressures that give it. `Dimension`
-/// torques are kept: two, or the one in the plane of a planar arm.
+/// The chambers of one segment: which tau_A they can reach, and the pressures that give it.
+/// `Dimension` is the number of torque components: two, or one in the plane of a planar arm.
 template <int Dimension>
 class ChamberMap {
  public:
@@ -35,10 +35,12 @@ class ChamberMap {
   ChamberMap(const std::vector<Torque>& columns, double min_pressure_bar, double max_pressure_bar,
              double bias_pressure_bar);
 
+  /// Number of chambers.
   int size() const noexcept { return size_; }
-  /// Smallest and largest distance (N m) from zero torque to a facet of the reachable set;
-  /// negative: outside of it.
+  /// Smallest distance (N m) from zero torque to a facet of the reachable set; negative: zero is
+  /// outside the set.
   double weakest_torque_nm() const noexcept;
+  /// Largest such distance (N m).
   double strongest_torque_nm() const noexcept;
 
   /// Largest s in [0, 1] for which s torque is reachable; exact, one pass over the facets of the
@@ -49,7 +51,7 @@ class ChamberMap {
   /// as above. A torque that is not finite counts as unreachable: s = 0.
   double allocate(const Torque& torque_nm, Pressures& pressures_bar) const noexcept;
 
-  /// W p.
+  /// W p (N m) of `size()` pressures (bar).
   Torque torque(const double* pressures_bar) const noexcept;
 
  private:
@@ -79,21 +81,23 @@ struct Allocation {
   bool saturated = false;  ///< any s < 1
 };
 
-/// Every segment's chambers. A planar arm's out-of-plane torque is dropped both ways: its structure
-/// carries it. With actuation by torque the "pressures" are tau_A itself, shortened a segment where
-/// a component is beyond the limit.
+/// The chambers of all segments. A planar arm's out-of-plane torque is dropped in both directions:
+/// its structure carries it. With actuation by torque the "pressures" are tau_A itself, scaled down
+/// per segment where a component exceeds the limit.
 class PressureAllocator {
  public:
-  /// Throws std::invalid_argument (segment, expected, got, cure) for a map that cannot reach every
+  /// @throws std::invalid_argument (segment, expected, got, fix) for a map that cannot reach every
   /// torque direction: fewer than 3 chambers (2 if planar) or more than kMaxChambersPerSegment, a
   /// gain that is not positive, all chambers in a half plane, limits that exclude zero torque.
   explicit PressureAllocator(const ActuationSettings& settings);
 
+  /// Number of segments.
   int segments() const noexcept { return segments_; }
   /// Chambers of all segments together.
   int chambers() const noexcept { return chambers_; }
-  /// Index of the first chamber of a segment in a PressureVector, and their number.
+  /// Index in a PressureVector of the first chamber of a segment (from 0).
   int first_chamber(int segment) const noexcept;
+  /// Number of chambers of a segment (from 0).
   int chambers_of(int segment) const noexcept;
 
   /// tau_actuation_nm: 2n, (tau_x, tau_y) about the local axes. Finds per segment the largest s <=

@@ -1,17 +1,18 @@
-// Limits on how fast commanded pressures move.
+// Limits of commanded pressures and of their rate.
 #pragma once
 
 #include "softarm/actuation/pressure_allocator.hpp"
 
 namespace softarm {
 
-/// `wanted`, or the value on the way to it that is at most `max_step` >= 0 away from `previous`. A
-/// `wanted` that is not finite, or a max_step that is not positive, leaves `previous`.
+/// Moves from `previous` towards `wanted` by at most `max_step` >= 0. Returns `previous` if
+/// `wanted` is not finite or `max_step` is not positive.
 double step_towards(double previous, double wanted, double max_step) noexcept;
 
 /// The last stage before the valves: pressure limits, slew limit, vent ramp. Holds no state.
 class PressureRamps {
  public:
+  /// Takes the limits (bar) and rates (bar/s) of the settings.
   explicit PressureRamps(const ActuationSettings& settings);
 
   /// Clamps `wanted_bar` into [min, max], then moves from `previous_bar` towards it by at most slew

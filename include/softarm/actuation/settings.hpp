@@ -1,4 +1,5 @@
-// What an experiment says about the chambers of each segment and the limits of their valves.
+// Settings of actuation: the chambers of each segment and the limits of their valves.
+// config/template.yaml documents every setting.
 #pragma once
 
 #include <cstddef>
@@ -12,9 +13,11 @@ namespace softarm {
 struct Chamber {
   double angle_rad = 0.0;
   double gain_nm_per_bar = 0.839;
+
+  bool operator==(const Chamber&) const = default;
 };
 
-/// What a command is made of.
+/// What a command consists of.
 enum class ActuationKind {
   chambers,  ///< pressures of chambers, in bar, none below zero
   torque     ///< tau_A itself, two signed moments (N m) about the local x and y axes a segment: for
@@ -22,17 +25,17 @@ enum class ActuationKind {
 };
 
 /// With `ActuationKind::torque` a segment has two "chambers" of gain 1, the moments about x and y;
-/// their angles mean nothing, and the limits are -max and max.
+/// their angles are not used, and the limits are -max and max.
 struct ActuationSettings {
   ActuationKind kind = ActuationKind::chambers;
   std::vector<std::vector<Chamber>>
       segments;  ///< chambers of each segment, in the order of the valves
   double min_pressure_bar = 0.0;
   double max_pressure_bar = 2.0;
-  double bias_pressure_bar = 0.0;   ///< where pressures rest that no torque asks to move
-  double slew_bar_per_s = 40.0;     ///< largest rate of a commanded pressure
-  double vent_bar_per_s = 8.0;      ///< rate of the ramp to zero when venting
-  std::optional<double> plane_rad;  ///< a planar arm bends only in the plane at this phi
+  double bias_pressure_bar = 0.0;
+  double slew_bar_per_s = 40.0;
+  double vent_bar_per_s = 8.0;
+  std::optional<double> plane_rad;
 };
 
 /// Number of chambers, or moments, of the whole arm.

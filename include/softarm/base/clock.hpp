@@ -1,5 +1,7 @@
-// The machine's monotonic clock, and deadlines on it.
+// The clocks of this machine, and deadlines on the monotonic one.
 #pragma once
+
+#include <time.h>
 
 #include <cstdint>
 
@@ -7,28 +9,39 @@ namespace softarm {
 
 /// CLOCK_MONOTONIC in ns.
 std::int64_t monotonic_now_ns() noexcept;
+/// Processor time of this thread in ns.
+std::int64_t thread_cpu_ns() noexcept;
 
 /// The monotonic and the wall clock (CLOCK_REALTIME) at one instant, in ns.
 struct ClockPair {
   std::int64_t monotonic_ns, wall_ns;
 };
 
-/// Reads both together: of a few attempts the one that was held up least between the readings.
+/// Reads both clocks together: the best of a few attempts, the one with the shortest time between
+/// the two readings.
 ClockPair read_clocks() noexcept;
+
+/// CLOCK_REALTIME in ns since 1970: the only clock that two machines, or two boots of one machine,
+/// share. It may be set at any time, also backwards.
+std::int64_t wall_now_ns() noexcept;
 
 /// Sleeps until an absolute time of CLOCK_MONOTONIC; returns early when a signal arrives.
 void sleep_until_ns(std::int64_t deadline_ns) noexcept;
 
-/// Absolute deadlines at a fixed period. Missed ones are skipped, never caught up with.
+/// Time left until `deadline_ns` of CLOCK_MONOTONIC, at least zero: the timeout of ppoll.
+timespec time_left(std::int64_t deadline_ns) noexcept;
+
+/// Absolute deadlines at a fixed period. Missed deadlines are skipped, never caught up with.
 class PeriodicDeadline {
  public:
   /// @param period_ns > 0  @param first_ns time of the first deadline
   PeriodicDeadline(std::int64_t period_ns, std::int64_t first_ns) noexcept
       : period_ns_(period_ns), next_ns_(first_ns) {}
 
+  /// The next deadline, in the clock of `first_ns`.
   std::int64_t next_ns() const noexcept { return next_ns_; }
 
-  /// To be called after the work of a deadline; returns how many deadlines were missed and skipped.
+  /// Call after the work of a deadline. Returns how many deadlines were missed and skipped.
   std::int64_t advance(std::int64_t now_ns) noexcept {
     next_ns_ += period_ns_;
     if (now_ns <= next_ns_) return 0;

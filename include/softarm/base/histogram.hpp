@@ -7,16 +7,19 @@
 
 namespace softarm {
 
-/// 2^(bucket/2) us, the lower edge of a bucket.
+/// The lower edge of a bucket, 2^(bucket/2) us.
 inline double bucket_edge_us(int bucket) noexcept {
   const auto octave = static_cast<double>(std::uint64_t{1} << (bucket / 2));
   return bucket % 2 == 0 ? octave : octave * 1.4142135623730951;
 }
 
+/// Number of buckets: the last one begins at 2^15.5 us = 46 ms.
 inline constexpr int kDurationBuckets = 32;
+/// How many durations fell into each bucket.
 using DurationCounts = std::array<std::int64_t, kDurationBuckets>;
 
-/// Upper edge of the bucket below which `fraction` of the durations lie; 0 when there are none.
+/// Upper edge, in us, of the bucket below which `fraction` (0 to 1) of the durations lie; 0 if
+/// there are none.
 inline double quantile_us(const DurationCounts& counts, double fraction) noexcept {
   std::int64_t total = 0;
   for (const auto count : counts) total += count;
@@ -29,16 +32,19 @@ inline double quantile_us(const DurationCounts& counts, double fraction) noexcep
   return 0.0;
 }
 
-/// Bucket k counts durations from 2^(k/2) us up to the next; bucket 0 also everything shorter, the
-/// last one everything longer.
+/// Bucket k counts durations from 2^(k/2) us to the lower edge of the next bucket; bucket 0 also
+/// counts everything shorter, the last bucket everything longer.
 class DurationHistogram {
  public:
+  /// Counts one duration in ns.
   void add_ns(std::int64_t duration_ns) noexcept {
     ++counts_[static_cast<std::size_t>(bucket(duration_ns))];
     if (duration_ns > max_ns_) max_ns_ = duration_ns;
   }
 
+  /// Counts of all buckets.
   const DurationCounts& counts() const noexcept { return counts_; }
+  /// The longest duration so far, in us.
   double max_us() const noexcept { return 1e-3 * static_cast<double>(max_ns_); }
 
  private:

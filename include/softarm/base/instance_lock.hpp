@@ -1,4 +1,4 @@
-// One instance of a program a name.
+// At most one instance of a program per name.
 #pragma once
 
 #include <stdexcept>
@@ -11,11 +11,12 @@ class OtherInstance : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Held for the life of the process: keeps a second instance away from the same name. No file is
-/// left behind.
+/// Prevents a second process from taking the same name for as long as the object exists. Leaves no
+/// file behind, however the process ends.
 class InstanceLock {
  public:
-  /// @throws OtherInstance; std::runtime_error if no lock can be taken at all
+  /// @throws OtherInstance if another process holds `name`; std::runtime_error if no lock can be
+  /// taken at all
   explicit InstanceLock(const std::string& name);
   ~InstanceLock();
   InstanceLock(const InstanceLock&) = delete;

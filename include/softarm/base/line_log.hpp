@@ -1,33 +1,39 @@
-// Lines from a loop that must not wait, printed by a thread that may.
+// Log lines of a loop that must not block, printed by a thread that may.
 #pragma once
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <atomic>
-#include <chrono>
+#include <cstdint>
 #include <functional>
 #include <string>
 #include <string_view>
 #include <thread>
+#include <utility>
 
 namespace softarm {
 
-/// One writer. Bounded: a line that does not fit is cut, lines that come faster than they can be
-/// printed (10 a second for long) are counted.
+/// A bounded log for one writing thread. A line that does not fit is cut, and lines that come
+/// faster than they can be printed (kCapacity at once, 10 per second sustained) are counted, not
+/// queued.
 class LineLog {
  public:
-  /// @param print  called from the thread, one whole line at a time with its newline; must not
-  /// throw
-  LineLog(std::string_view program, std::function<void(const std::string&)> print)
-      : program_(program),
-        print_(std::move(print)),
-        thread_([this](const std::stop_token& stop) { print_until(stop); }) {}
+  /// Lines that may wait to be printed.
+  static constexpr std::size_t kCapacity = 64;
+  /// Characters kept of a line.
+  static constexpr std::size_t kLongestLine = 240;
 
-  /// Prints what is still to be printed and ends the thread.
+  /// @param program  prefix of every line: "program: line"
+  /// @param print  called from the printing thread with one whole line at a time, newline included;
+  /// must not throw
+  LineLog(std::string program, std::function<void(const std::string&)> print);
+
+  /// Prints the waiting lines and ends the thread.
   void finish() { thread_ = {}; }
 
-  /// Formats into a buffer that is there already: neither allocates nor waits.
+  /// Formats a line into a preallocated buffer: neither allocates nor waits.
   template <class... Arguments>
   void add(fmt::format_string<Arguments...> format, Arguments&&... arguments) noexcept {
     const std::size_t head = head_.load(std::memory_order_relaxed);
@@ -47,33 +53,14 @@ class LineLog {
   }
 
  private:
-  static constexpr std::size_t kCapacity = 32;
-  static constexpr std::chrono::milliseconds kPause{100};
   struct Line {
-    std::array<char, 240> text;
+    std::array<char, kLongestLine> text;
     std::size_t length = 0;
   };
 
-  void print_until(const std::stop_token& stop) {
-    while (true) {
-      const bool last = stop.stop_requested();
-      // One line a pause, but all of them in the end.
-      bool printed = false;
-      for (std::size_t tail = tail_.load();
-           tail != head_.load(std::memory_order_acquire) && (last || !printed);
-           tail_.store(++tail)) {
-        const Line& line = lines_[tail % kCapacity];
-        print_(fmt::format("{}: {}\n", program_, std::string_view(line.text.data(), line.length)));
-        printed = true;
-      }
-      if (const auto lost = lost_.exchange(0); lost > 0)
-        print_(fmt::format("{}: {} lines came too fast to be printed\n", program_, lost));
-      if (last) return;
-      std::this_thread::sleep_for(kPause);
-    }
-  }
+  void print_until(const std::stop_token& stop);
 
-  std::string_view program_;
+  std::string program_;
   std::function<void(const std::string&)> print_;
   std::array<Line, kCapacity> lines_{};
   std::atomic<std::size_t> head_{0}, tail_{0};

@@ -1,4 +1,4 @@
-// How a thread that must not be late runs on Linux: scheduling, processor, memory.
+// Scheduling, CPU pinning and memory locking of a real-time thread on Linux.
 #pragma once
 
 #include <string>
@@ -8,17 +8,17 @@ namespace softarm {
 
 /// Scheduling of the thread that calls apply_realtime_settings.
 struct RealtimeSettings {
-  bool fifo = false;  ///< SCHED_FIFO for the tick
-  int priority = 50;
-  int cpu = -1;  ///< pin the tick's thread; -1: do not
-  bool lock_memory = false;
+  bool fifo = false;         ///< schedule under SCHED_FIFO
+  int priority = 50;         ///< of SCHED_FIFO, 1 to 99
+  int cpu = -1;              ///< pin the thread of the tick to this CPU; -1: do not
+  bool lock_memory = false;  ///< mlockall
 };
 
-/// Applies scheduling, pinning and memory locking to the calling thread and process; with locked
-/// memory 256 KiB of the calling thread's stack are there already, so that they cause no page fault
-/// later. The thread's sleeps end when they are due, to 1 ns instead of the usual 50 us, under any
-/// scheduling. What the machine does not permit is left undone and reported: one line each, with
-/// the cure.
+/// Applies scheduling, pinning and memory locking to the calling thread and process. With locked
+/// memory, 256 KiB of the calling thread's stack are touched in advance, so that they cause no page
+/// fault later. Under any scheduling, the timer slack of the thread's sleeps is reduced from the
+/// usual 50 us to 1 ns. What the machine does not permit is left undone and returned: one line
+/// each, with the fix.
 std::vector<std::string> apply_realtime_settings(const RealtimeSettings& settings);
 
 /// Whether the calling thread runs under SCHED_FIFO.

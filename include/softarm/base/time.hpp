@@ -1,4 +1,5 @@
-// Times as integers of nanoseconds: conversions from and to seconds, and the time that never comes.
+// Times as integer nanoseconds: conversion from and to seconds, and the times "never" and
+// "forever".
 #pragma once
 
 #include <cmath>
@@ -7,15 +8,28 @@
 
 namespace softarm {
 
-/// The arrival of what has not come yet: before every time of a clock.
+/// The arrival time of what has not arrived yet: before every time of a clock.
 inline constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::min();
-/// The expiry of what does not expire: after every time of a clock.
+/// The expiry time of what does not expire: after every time of a clock.
 inline constexpr std::int64_t kForever = std::numeric_limits<std::int64_t>::max();
 
-/// Seconds as nanoseconds, rounded to nearest; |seconds| below 9.2e9 (292 years).
+/// Largest magnitude of a time in microseconds that is accepted from the wire or from a log (127
+/// years): sums and differences of two such times fit into 64-bit nanoseconds.
+inline constexpr std::int64_t kLatest_us = 4'000'000'000'000'000;
+/// Whether `time_us` is within +-kLatest_us.
+inline bool is_time_us(std::int64_t time_us) noexcept {
+  return time_us >= -kLatest_us && time_us <= kLatest_us;
+}
+
+/// How long before `now_ns` `then_ns` was, in ns; kForever where it is kNever.
+inline std::int64_t age_ns(std::int64_t now_ns, std::int64_t then_ns) noexcept {
+  return then_ns == kNever ? kForever : now_ns - then_ns;
+}
+
+/// Seconds to nanoseconds, rounded to nearest; |seconds| must be below 9.2e9 (292 years).
 inline std::int64_t to_ns(double seconds) noexcept { return std::llround(1e9 * seconds); }
 
-/// Nanoseconds as seconds.
+/// Nanoseconds to seconds.
 inline double to_seconds(std::int64_t nanoseconds) noexcept {
   return 1e-9 * static_cast<double>(nanoseconds);
 }

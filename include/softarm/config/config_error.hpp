@@ -1,4 +1,4 @@
-// What is wrong with a configuration, and where: the only exception that reading one throws.
+// The error of a configuration and its location: the only exception thrown by reading one.
 #pragma once
 
 #include <stdexcept>
@@ -6,16 +6,17 @@
 
 namespace softarm {
 
-/// Evidence of a faulty configuration. what() is "file:line: key: expected X, got Y".
+/// A faulty configuration. what() is "file:line: key: expected X, got Y".
 class ConfigError : public std::runtime_error {
  public:
   std::string file;  ///< as the user named it
-  int line = 0;      ///< 1-based; 0: the fault belongs to no line (the file cannot be read)
+  int line = 0;      ///< 1-based; 0: no line (the file cannot be read)
   std::string
       key;  ///< full dotted path, e.g. "arm.segments[1].length_m"; empty: the file as a whole
   std::string expected;  ///< with unit and range
   std::string got;
 
+  /// Composes what() of its parts.
   ConfigError(std::string file_name, int line_number, std::string key_path,
               std::string expected_text, std::string got_text);
 };

@@ -1,4 +1,5 @@
-// One experiment: everything a YAML file decides, composed of the settings that each room declares.
+// One experiment: everything a YAML file decides, composed of the settings that each module declares.
+// config/template.yaml documents every setting.
 #pragma once
 
 #include <cstdint>
@@ -6,6 +7,7 @@
 
 #include "softarm/base/realtime.hpp"
 #include "softarm/config/identification_settings.hpp"
+#include "softarm/config/motion_limits.hpp"
 #include "softarm/runtime/settings.hpp"
 #include "softarm/simulation/settings.hpp"
 #include "softarm/transport/settings.hpp"
@@ -15,12 +17,12 @@ namespace softarm {
 
 /// Defaults of a simulated run.
 struct RunSettings {
-  double duration_s = 20.0;      ///< default of `softarm run` and tools/demo
-  double tracking_from_s = 1.0;  ///< after ACTIVE; tracking errors count from here on
-  double log_rate_hz = 0.0;      ///< rows of log.csv, from which errors are taken; 0: every tick
+  double duration_s = 20.0;
+  double tracking_from_s = 1.0;
+  double log_rate_hz = 0.0;
 };
 
-/// An experiment as its file says it, defaults filled in.
+/// An experiment as in its file, defaults filled in.
 struct Experiment : PipelineSettings {
   std::string name;
   std::uint64_t seed = 1;
@@ -30,6 +32,7 @@ struct Experiment : PipelineSettings {
   ValveDriverSettings valves;
   RunSettings run;
   IdentificationSettings identification;
+  MotionLimits motion_limits;
   std::uint64_t hash = 0;  ///< FNV-1a of the resolved configuration's text
 };
 

@@ -1,5 +1,5 @@
-// What an experiment says about `softarm identify`: the steps it plays, the limits it keeps, and
-// what it found beyond the controller's own model.
+// Settings of `softarm identify`: the steps it plays, and the terms it found beyond the
+// controller's model. config/template.yaml documents every setting.
 #pragma once
 
 #include <vector>
@@ -8,16 +8,14 @@ namespace softarm {
 
 /// The steps that `softarm identify` plays, and the model it fits.
 struct IdentificationSettings {
-  std::vector<double> steps_bar = {0.2, 0.4, 0.6};  ///< on every side in turn, as in VII-B1
-  double hold_s = 2.0;                              ///< from step to step
-  double max_theta_rad = 1.5;     ///< a segment that bends farther ends the experiment
-  double max_speed_radps = 20.0;  ///< so does one that moves faster
+  std::vector<double> steps_bar = {0.2, 0.4, 0.6};
+  double hold_s = 2.0;
 
-  // Terms that the controller does not know, for predicting a recorded motion.
+  // Terms that the controller does not use, for predicting a recorded motion.
   std::vector<double> rest_u_rad;  ///< 2n: where the springs rest; empty: straight
-  double cubic_nm_per_rad3 = 0.0;  ///< adds cubic |u - rest|^2 (u - rest) to K u
-  double lag_s = 0.0;              ///< first order, from a set point to what bends the arm
-  double delay_s = 0.0;            ///< from a set point until a frame can show it
+  double cubic_nm_per_rad3 = 0.0;
+  double lag_s = 0.0;
+  double dead_time_s = 0.0;
 };
 
 }  // namespace softarm

@@ -13,7 +13,7 @@ namespace softarm {
 
 /// Reads and checks an experiment, with the files it includes. Every value of the result is finite,
 /// in its range and consistent with the others.
-/// @throws ConfigError and nothing else.
+/// @throws ConfigError, no other exception
 Experiment load_experiment(const std::filesystem::path& file);
 
 /// The whole configuration as YAML, every default written out, units in comments. Loads again to
@@ -24,11 +24,17 @@ std::string resolved_text(const Experiment& experiment);
 /// (config/template.yaml).
 std::string template_text();
 
-/// What is allowed but probably not meant, as sentences for a person: gains that the declared delay
-/// does not allow, motion capture too slow for the safety thresholds. Empty if all is well.
+/// The JSON Schema (draft 7) by which editors complete and check an experiment
+/// (config/experiment.schema.json). It accepts what load_experiment accepts, and more: conditions
+/// across several keys, or across including files, are not checked.
+std::string schema_text();
+
+/// Warnings about settings that are allowed but probably not intended, one sentence each: gains
+/// that the declared delay does not allow, motion capture too slow for the safety thresholds. Empty
+/// if all is well.
 std::vector<std::string> experiment_warnings(const Experiment& experiment);
 
-/// Sixteen hexadecimal digits, as logs and the status message show Experiment::hash.
+/// Sixteen hexadecimal digits, the form of Experiment::hash in logs and in the status message.
 std::string hash_text(std::uint64_t hash);
 
 }  // namespace softarm

@@ -8,6 +8,7 @@
 #include "softarm/control/settings.hpp"
 #include "softarm/model/arm.hpp"
 #include "softarm/model/dynamics.hpp"
+#include "softarm/model/model_correction.hpp"
 
 namespace softarm {
 
@@ -38,8 +39,10 @@ class CurvatureController {
   /// window whose interval_s > 0 it adds valve_lag d/dt FF(t) by a central difference, where FF =
   /// G(u_r) + C(u_r,u_r') u_r' + B(u_r) u_r'' + K u_r + D u_r' is what (17) asks for on the
   /// reference itself.
+  /// @param correction of the model, or null; used as settings.disturbance says. Where it is exact,
+  /// (18) holds for the arm that it corrects to.
   void compute(ConstVectorRef u, ConstVectorRef velocity, const ReferenceWindow& reference,
-               ControlOutput& out) noexcept;
+               ControlOutput& out, const ModelCorrection* correction = nullptr) noexcept;
 
   /// Integral action, where K_I is not zero: what it holds grows by period_s K_I (u_ref - u) and is
   /// added by compute() from then on. scale: n, the part of every segment's torque that the
@@ -58,6 +61,10 @@ class CurvatureController {
                       ControlOutput& out) noexcept;
   void feed_forward(const ReferenceSample& reference, SegmentVector& out) noexcept;
   void add_lag_inverse(const ReferenceWindow& reference, ControlOutput& out) noexcept;
+  void add_correction(const ModelCorrection& correction, ConstVectorRef u,
+                      const ReferenceSample& reference, SegmentVector& force_nm) noexcept;
+  void correct(const ModelCorrection& correction, ConstVectorRef u,
+               const ReferenceWindow& reference, ControlOutput& out) noexcept;
 
   ArmParameters arm_;
   ControllerSettings settings_;
@@ -65,6 +72,8 @@ class CurvatureController {
   SegmentVector kp_, kd_, stiffness_, damping_;
   SegmentVector velocity_ref_, acceleration_ref_, before_, after_;
   SegmentVector ki_, integral_;
+  HorizontalLoad horizontal_;
+  SegmentVector along_x_, along_y_;
   bool integrates_;
 };
 

@@ -37,9 +37,6 @@ double largest_gain_factor(const ArmParameters& arm, const LoopSampling& samplin
                            const Eigen::VectorXd& kp_u, const Eigen::VectorXd& kd_u,
                            bool gravity_fed_back);
 
-/// Slope of G at u (2n x 2n, N m/rad), by central differences. Not for the loop: allocates.
-Eigen::MatrixXd gravity_slope(const ArmParameters& arm, const Eigen::VectorXd& u);
-
 /// Compliance of the tip (m/N, world frame) against a small constant force on an arm at rest in u:
 ///   J (K + K_P + G_u)^-1 J'.
 /// gravity_fed_back: the controller's G(u) takes G_u away, as (17) does; K_P = 0 and false is the

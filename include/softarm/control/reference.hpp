@@ -11,29 +11,10 @@
 
 #include <memory>
 
-#include "softarm/control/inverse_kinematics.hpp"
 #include "softarm/control/settings.hpp"
 #include "softarm/model/arm.hpp"
 
 namespace softarm {
-
-/// A reference at one time: 2n numbers each; rad, rad/s, rad/s^2.
-struct ReferenceSample {
-  SegmentVector u;
-  SegmentVector velocity;
-  SegmentVector acceleration;
-  /// The same in polar coordinates [phi, theta] a segment, where the reference knows them without
-  /// dividing by theta
-  /// ((24) outside of a blend); otherwise has_polar is false and they are unspecified.
-  bool has_polar = false;
-  SegmentVector polar;
-  SegmentVector polar_velocity;
-  SegmentVector polar_acceleration;
-  bool limited = false;  ///< a soft limit (theta or speed) bent this sample, or could not
-  /// Where the tip should be, in a phase that is given in task space; joining not counted.
-  bool has_tip = false;
-  TipReference tip;
-};
 
 /// A reference now and a little before and after, for the derivative that inverts the valve lag.
 struct ReferenceWindow {
@@ -74,8 +55,8 @@ double largest_theta_rad(const ReferenceSettings& settings) noexcept;
 /// derivatives exact), and flagged; a blend that still exceeds max_speed_radps is only flagged.
 class Reference {
  public:
-  /// Throws std::invalid_argument (phase, expected, got) for sizes, times or limits that do not
-  /// fit.
+  /// Throws ReferenceError for sizes, times or limits of a phase that do not fit, and
+  /// std::invalid_argument for other settings.
   Reference(const ReferenceSettings& settings, const ControllerSettings& control,
             const ArmParameters& arm);
   /// Where no phase is in task space, the number of segments is all that matters.

@@ -1,12 +1,11 @@
 // What an experiment may choose about control: the law, its gains, its terms and the reference it
 // follows.
+// config/template.yaml documents every setting.
 #pragma once
 
-#include <Eigen/Core>
-#include <string>
-#include <variant>
 #include <vector>
 
+#include "softarm/control/reference_kinds.hpp"
 #include "softarm/model/arm.hpp"
 
 namespace softarm {
@@ -19,19 +18,26 @@ enum class ControlCoordinates {
 
 /// The terms of (17) that are evaluated; one that is left out costs nothing.
 struct ControlTerms {
-  bool inertia = true;    ///< B u''_ref
-  bool coriolis = true;   ///< C(u, u') u'_ref
-  bool gravity = true;    ///< G
-  bool stiffness = true;  ///< K u_ref
-  bool damping = true;    ///< D u'_ref
+  bool inertia = true;
+  bool coriolis = true;
+  bool gravity = true;
+  bool stiffness = true;
+  bool damping = true;
 };
 
 /// How a path of the tip becomes a motion of the segments: (21) as corrected, second order.
 struct TaskSpaceSettings {
-  double lambda_1ps = 6.0;  ///< the tip's error law has both poles at -lambda: Lambda_p = lambda^2,
-                            ///< Lambda_d = 2 lambda
-  double tip_bandwidth_radps = 10.0;  ///< of the filter on what the tip is off the reference's own
-  double posture_rate_1ps = 2.0;      ///< null space of J: u decays at this rate, towards less bend
+  double lambda_1ps = 6.0;
+  double tip_bandwidth_radps = 10.0;
+  double posture_rate_1ps = 2.0;
+};
+
+/// What (17) makes of what the model-based observer found; nothing where there is none.
+enum class DisturbanceRejection {
+  cancel,      ///< corrected parameters, and the estimated disturbance is cancelled: no offset, and
+               ///< the arm gives way to nothing that lasts
+  model_only,  ///< corrected parameters: the arm stays as soft as K + K_P
+  none         ///< the configured model
 };
 
 /// The controller (17): its terms, gains and limits.
@@ -45,68 +51,16 @@ struct ControllerSettings {
   /// Diagonal of an integral gain on u_ref - u (N m/(rad s)), in u whatever the coordinates; not in
   /// the paper. Empty or zero: none, at no cost.
   std::vector<double> ki;
-  double valve_lag_s =
-      0.0;  ///< first-order lag inverted on the part of (17) that depends on the reference alone
-  double delay_s = 0.0;  ///< dead time of valves and tubes, for the load-time gain check alone
-  double max_theta_rad = 2.5;     ///< soft limit on the reference's and the arm's theta
-  double max_speed_radps = 20.0;  ///< soft limit on the reference's |u'| a segment
-  double max_step_rad = 0.2;      ///< a larger jump of a live reference is refused
-  double blend_s = 1.0;           ///< time in which a reference is joined from wherever the arm is
-  double polar_theta_min_rad =
-      0.05;                      ///< bounds A^-1 and the phi error near theta = 0 in polar mode
-  TaskSpaceSettings task_space;  ///< for references of the tip
+  DisturbanceRejection disturbance = DisturbanceRejection::cancel;
+  double valve_lag_s = 0.0;
+  double dead_time_s = 0.0;
+  double max_theta_rad = 2.5;
+  double max_speed_radps = 20.0;
+  double max_step_rad = 0.2;
+  double blend_s = 1.0;
+  double polar_theta_min_rad = 0.05;
+  TaskSpaceSettings task_space;
 };
-
-/// Hold u constant.
-struct SetPointReference {
-  std::vector<double> u_rad;  ///< 2n
-};
-
-/// The paper's (24): theta rises to `theta_rad` in `rise_s`, phi_i = phi_centre + phi_amplitude
-/// cos(rate t + (i-1) phase).
-struct PaperReference {
-  double theta_rad = 0.4;
-  double rise_s = 1.0;
-  double phi_centre_rad = 3.141592653589793;
-  double phi_amplitude_rad = 1.0;
-  double rate_radps = 2.0;
-  double phase_step_rad = 1.0471975511965976;  ///< pi/3 from segment to segment
-};
-
-/// Where the arm is to be at a time of the phase.
-struct WayPoint {
-  double time_s = 0.0;
-  std::vector<double> u_rad;  ///< 2n
-};
-/// Smooth motion through way points: minimum-jerk (quintic) pieces, at rest in every point.
-struct WayPointReference {
-  std::vector<WayPoint> points;
-  bool repeat = false;
-};
-
-/// References received over LCM; until one arrives, the arm holds where it is.
-struct LiveReference {
-  double timeout_s = 0.2;  ///< silence after which the last received u is held at rest
-};
-
-/// Path p_d(t) of the tip in the world.
-enum class TipPathShape {
-  point,      ///< p_d = centre
-  circle,     ///< p_d = centre + first_axis cos(rate t) + second_axis sin(rate t); an ellipse
-  lemniscate  ///< p_d = centre + first_axis cos(rate t) + second_axis sin(2 rate t)
-};
-
-/// Where the tip should be, in the world frame; the defaults are the paper's lemniscate (22).
-struct TipPathReference {
-  TipPathShape shape = TipPathShape::lemniscate;
-  Eigen::Vector3d centre_m = Eigen::Vector3d(-0.25, 0.0, -0.5);
-  Eigen::Vector3d first_axis_m = Eigen::Vector3d(0.0, 1.0 / 3.0, 0.0);
-  Eigen::Vector3d second_axis_m = Eigen::Vector3d(0.0, 0.0, 1.0 / 6.0);
-  double rate_radps = 0.6283185307179586;
-};
-
-using ReferenceKind = std::variant<SetPointReference, PaperReference, WayPointReference,
-                                   LiveReference, TipPathReference>;
 
 /// One phase of a sequence; the last one lasts for ever.
 struct ReferencePhase {

@@ -4,6 +4,8 @@
 #include <array>
 #include <cstdint>
 
+#include "softarm/base/time.hpp"
+
 namespace softarm {
 
 /// What a capture time is reckoned from.
@@ -44,7 +46,7 @@ class ClockRelation {
  private:
   static constexpr int kBuckets = 10;
   struct Bucket {
-    std::int64_t period = -1;  // number of the bucket's 0.2 s on our clock
+    std::int64_t period = kNever;  // number of the bucket's 0.2 s on our clock
     std::int64_t least_ns = 0;
   };
 

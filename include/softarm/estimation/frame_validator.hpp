@@ -25,10 +25,6 @@ enum class FrameVerdict {
   not_seen           ///< no segment has both its ends
 };
 
-/// The verdict's name as above; "unknown" for a value outside the enumeration. noexcept, static
-/// storage.
-const char* verdict_name(FrameVerdict verdict) noexcept;
-
 /// Totals since construction.
 struct FrameCounters {
   std::int64_t accepted = 0;

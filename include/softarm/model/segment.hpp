@@ -20,10 +20,6 @@ Eigen::Vector3d segment_centre(double length_m, const Eigen::Vector2d& u_rad) no
 Eigen::Vector3d segment_point(double length_m, const Eigen::Vector2d& u_rad,
                               double arc_fraction) noexcept;
 
-/// d tip / d u, 3 x 2, in m/rad, in S_{i-1}.
-Eigen::Matrix<double, 3, 2> segment_tip_jacobian(double length_m,
-                                                 const Eigen::Vector2d& u_rad) noexcept;
-
 /// Columns: angular velocity of S_i relative to S_{i-1} for unit u', 3 x 2, in S_{i-1}.
 Eigen::Matrix<double, 3, 2> segment_angular_jacobian(const Eigen::Vector2d& u_rad) noexcept;
 

@@ -1,4 +1,4 @@
-// What an experiment leaves behind: log.csv while it runs, summary.json and timing.json at its end.
+// The files of an experiment: log.csv while it runs, summary.json and timing.json at its end.
 #pragma once
 
 #include <cstdint>
@@ -14,15 +14,16 @@
 
 namespace softarm {
 
-/// Writes DIR/log.csv.
+/// Writes FOLDER/log.csv, one row per tick.
 class ExperimentLog {
  public:
   /// @throws std::runtime_error if the folder or the file cannot be made
   ExperimentLog(const std::filesystem::path& folder, const Experiment& experiment);
 
+  /// Appends a row.
   void add(const LogRow& row);
 
-  /// Flushes; @throws std::runtime_error if anything could not be written (a full disk).
+  /// Flushes and closes. @throws std::runtime_error if anything could not be written (a full disk).
   void close();
 
  private:
@@ -39,12 +40,13 @@ class ExperimentLog {
   std::string line_;
 };
 
-/// The `# softarm VERSION commit ...` line that every log begins with.
+/// The line `# softarm VERSION commit ...` at the start of every log.
 std::string provenance_line(const Experiment& experiment);
 
 /// Durations of a run for timing.json.
 struct TimingReport {
   double real_time_factor = 0.0;  ///< simulated over wall time; 1 for the daemon
+  /// A histogram with its name in the file.
   struct Named {
     const char* name;
     DurationCounts counts;
@@ -52,9 +54,10 @@ struct TimingReport {
   };
   std::vector<Named> histograms;
 };
+/// The text of timing.json: quantiles, maxima and counts of all histograms, in us.
 std::string timing_json(const TimingReport& report);
 
-/// @throws std::runtime_error if the file cannot be written
+/// Writes a text file. @throws std::runtime_error if it cannot be written
 void write_text(const std::filesystem::path& path, const std::string& text);
 
 }  // namespace softarm

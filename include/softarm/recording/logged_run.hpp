@@ -1,10 +1,8 @@
-// The daemon's pipeline fed from a recorded LCM log instead of an arm: what the estimator makes of
-// real data.
+// Runs the daemon's pipeline on a recorded LCM log instead of an arm: the estimator on real data.
 #pragma once
 
 #include <cstdint>
 #include <filesystem>
-#include <fstream>
 #include <vector>
 
 #include "softarm/base/histogram.hpp"
@@ -17,25 +15,28 @@
 
 namespace softarm {
 
-/// Ticks at whole control periods from the log's first motion-capture frame on; frames arrive when
-/// the log says they did. Commands are computed and go nowhere: no valve has to publish pressures,
-/// and nobody has to arm or to hold a button (SimulatedOperator). Reads the log as it goes: memory
-/// does not grow with its length.
+/// Ticks at whole control periods from the first motion-capture frame of the log; frames arrive at
+/// their logged times. Commands are computed but not sent; measured pressures and a person who arms
+/// or holds a button are not needed (SimulatedOperator). Reads the log as it proceeds: memory does
+/// not grow with its length.
 class LoggedRun {
  public:
-  /// @throws std::runtime_error if the log cannot be opened or holds no frame on the configured
+  /// @throws std::runtime_error if the log cannot be opened or contains no frame on the configured
   /// channel
   LoggedRun(const Experiment& experiment, const std::filesystem::path& log);
 
-  /// One tick; false once the log is at its end. There is no truth to fill in, and nothing at all
-  /// where the tick is not `logged`.
+  /// Runs one tick; false at the end of the log. Fills `row` (except the true state, which is not
+  /// known) only if the tick is `logged`.
   bool step(LogRow& row, bool logged = true);
 
+  /// The pipeline after its latest tick.
   const ControlPipeline& pipeline() const { return pipeline_; }
+  /// Computing times of the ticks.
   const DurationHistogram& tick_times() const { return tick_times_; }
+  /// Messages on the motion-capture channel that could not be decoded.
   std::int64_t malformed() const { return malformed_; }
 
-  /// Tells what of the log is damaged or cut; what precedes and follows that was used.
+  /// The log, for its damage; everything before and after damage was used.
   const EventLogReader& log() const { return log_; }
 
  private:
@@ -45,10 +46,9 @@ class LoggedRun {
   ControlPipeline pipeline_;
   SimulatedOperator operator_;
   MocapSource mocap_;
-  std::ifstream file_;
   EventLogReader log_;
   std::vector<MocapFrame> frames_;
-  MocapFrame next_;  ///< read from the log, not arrived yet
+  MocapFrame next_;  ///< read from the log, but not arrived yet
   std::int64_t next_arrival_ns_ = 0;
   bool has_next_ = false;
   std::int64_t start_ns_ = 0;

@@ -1,4 +1,4 @@
-// A recorded run once more: the pipeline is given what its ticks were given, and must say the same.
+// Replays a recorded run: the pipeline gets the recorded inputs and must give the recorded outputs.
 #pragma once
 
 #include <array>
@@ -17,75 +17,81 @@
 
 namespace softarm {
 
-/// Ticks [first, last] of a run of the daemon that no record tells of.
+/// Ticks [first, last] of a run of the daemon without a record in the log.
 struct ReplayGap {
   std::int64_t first = 0, last = 0;
-  std::int64_t position = 0;  ///< in the log: of the record that follows
-  double time_s = 0.0;        ///< of that record, since the run's first
+  std::int64_t position = 0;  ///< of the next record, in bytes in the log
+  double time_s = 0.0;        ///< of the next record, since the first of the run
 };
 
-/// The first tick whose command or status is not what was recorded.
+/// The first tick whose command or status differs from the recorded one.
 struct ReplayDifference {
   std::int64_t run = 0, tick = 0;
   double time_s = 0.0;                  ///< since the run's first tick
-  std::int64_t position = 0;            ///< of the recorded message in the log
+  std::int64_t position = 0;            ///< of the recorded message, in bytes in the log
   std::vector<FieldDifference> fields;  ///< "command.pressure_bar[3]", "status.mode", ...
 };
 
-/// What of a kind of message was compared, and how much of it differed.
+/// How many messages of one kind were compared, and how many of them differed.
 struct ReplayCount {
   std::int64_t compared = 0, different = 0;
 };
 
+/// The result of a replay.
 struct ReplaySummary {
-  static constexpr std::size_t kGapsKept = 16;
+  static constexpr std::size_t kGapsKept = 16;  ///< in `gaps`
 
   std::int64_t runs = 0;   ///< of a daemon
   std::int64_t ticks = 0;  ///< replayed
   double duration_s = 0.0;
-  /// As the pipeline decided, as sent, and the status; of ticks whose whole past is in the log.
+  /// Commands as decided by the pipeline, commands as sent, and statuses, of the ticks whose whole
+  /// past is in the log.
   ReplayCount records, commands, statuses;
-  ReplayCount after_gap;           ///< records of ticks whose past is not: no proof of anything
-  std::int64_t agrees_again = -1;  ///< after the last gap: first tick from which on all agree
-  std::int64_t missing_ticks = 0;  ///< no record of them
+  ReplayCount after_gap;  ///< records of ticks whose past is not complete: prove nothing
+  std::int64_t agrees_again =
+      -1;  ///< after the last gap: first tick from which all agree; -1: none
+  std::int64_t missing_ticks = 0;  ///< ticks without a record
   std::int64_t gap_count = 0;
   std::vector<ReplayGap> gaps;  ///< the first kGapsKept
-  std::int64_t malformed = 0;   ///< messages on the channels read that are none
-  bool other_build = false;     ///< than ours made the recording
-  std::string recorded_build;   ///< of the first run; empty: not told
-  ReplayDifference first;       ///< where there is one
+  std::int64_t malformed = 0;   ///< messages on our channels that could not be decoded
+  bool other_build = false;     ///< another build than this one made the recording
+  std::string recorded_build;   ///< of the first run; empty: not recorded
+  ReplayDifference first;       ///< if there is one
 
+  /// Whether any message differed.
   bool different() const { return !first.fields.empty(); }
-  /// Every tick from the first on was there, was replayed and was the same.
+  /// Whether every tick from the first one was in the log, was replayed and was the same.
   bool complete() const { return ticks > 0 && gap_count == 0 && malformed == 0 && !different(); }
 };
 
-/// The log was recorded with another configuration. what() names both hashes.
+/// The log was recorded with another configuration; what() gives both hashes.
 class OtherConfiguration : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Takes the events of a log in order. Commands and statuses are compared with what the pipeline
-/// makes of the records of the same ticks; memory does not grow with the length of the log.
+/// Takes the events of a log in order and compares the recorded commands and statuses with those
+/// that the pipeline computes from the records of the same ticks. Memory does not grow with the
+/// length of the log.
 class Replay {
  public:
-  /// @param build of this program, see build_text()
-  /// @param any_configuration go on with a recording of another configuration
+  /// @param build  of this program, see build_text()
+  /// @param any_configuration  also replay a recording of another configuration
   Replay(const Experiment& experiment, std::string build, bool any_configuration);
 
-  /// @throws OtherConfiguration
+  /// Takes the next event. @throws OtherConfiguration
   void take(const LogEvent& event);
-  /// To be called once, after the last event.
+  /// Call once, after the last event.
   void finish();
 
+  /// The result; complete after finish().
   const ReplaySummary& summary() const { return summary_; }
 
  private:
-  static constexpr std::size_t kWindow = 256;  ///< ticks that wait for others
-  /// Ticks after which one that has not come is missing: its repetition is overdue.
+  static constexpr std::size_t kWindow = 256;  ///< ticks that may wait for others
+  /// A tick that has not come after so many later ones is missing: its repetition is overdue.
   static constexpr std::int64_t kPatience = TickRecorder::kRepeatAfter + 14;
 
-  struct Waiting {  ///< tick 0: nothing waits here
+  struct Waiting {  ///< tick 0: an empty place
     std::int64_t tick = 0, position = 0;
   };
   struct WaitingRecord : Waiting {
@@ -143,7 +149,7 @@ class Replay {
   WaitingStatus incoming_status_;
 
   bool running_ = false;
-  bool exact_ = false;         ///< every tick of this run so far was there
+  bool exact_ = false;         ///< every tick of this run so far was in the log
   std::int64_t first_ns_ = 0;  ///< of this run
   std::int64_t next_ = 1;      ///< tick to be replayed next
   std::int64_t newest_ = 0;    ///< tick of the newest record

@@ -1,4 +1,4 @@
-// The simulated arm's shape while it runs: DIR/shape.csv, for pictures of what u alone cannot show.
+// Logs the shape of the simulated arm to FOLDER/shape.csv, for plots of what u alone does not show.
 #pragma once
 
 #include <Eigen/Core>
@@ -7,29 +7,19 @@
 #include <filesystem>
 #include <memory>
 #include <string>
-#include <vector>
 
 #include "softarm/config/experiment.hpp"
 #include "softarm/runtime/log_row.hpp"
 
 namespace softarm {
 
-/// A part's bend as u (2 numbers a part, rad), from the plant's coordinates: segments, pieces, or
-/// links (R_x(a) R_y(b) is u = (b, -a) to first order).
-Eigen::VectorXd part_bends(const PlantSettings& plant, const Eigen::VectorXd& coordinates);
-
-/// Points along the arm from base to tip, world frame, m: the ends of every link, or points on
-/// every arc; as many for any coordinates of one plant.
-std::vector<Eigen::Vector3d> arm_points(const PlantSettings& plant,
-                                        const Eigen::VectorXd& coordinates);
-
-/// Writes a row of bends and points every 20 ms; no file where there is no simulated arm.
+/// Writes a row of the plant's shape every 20 ms; no file where there is no simulated arm.
 class ShapeLog {
  public:
-  /// Takes away what an earlier run left.
+  /// Removes the file of an earlier run from `folder`.
   ShapeLog(const std::filesystem::path& folder, const Experiment& experiment);
 
-  /// Rows without the plant's coordinates are passed over.
+  /// Appends a row; rows without the plant's coordinates are ignored.
   /// @throws std::runtime_error if the file cannot be made
   void add(const LogRow& row);
 
@@ -42,6 +32,7 @@ class ShapeLog {
   std::filesystem::path path_;
   std::string origin_;
   PlantSettings plant_;
+  std::unique_ptr<PlantSystem> arm_;  // of plant_, made for the first row
   std::unique_ptr<std::FILE, Closer> file_;
   double next_s_ = 0.0;
   std::string line_;

@@ -1,4 +1,4 @@
-// A run as its status messages tell it, from the wire or from an LCM log: the rows of log.csv.
+// Builds the rows of log.csv from the status messages of a run, live or from an LCM log.
 #pragma once
 
 #include <cstddef>
@@ -6,8 +6,6 @@
 #include <deque>
 #include <filesystem>
 #include <optional>
-#include <softarm_messages/controller_status_t.hpp>
-#include <softarm_messages/plant_state_t.hpp>
 #include <softarm_messages/timing_t.hpp>
 #include <span>
 #include <string>
@@ -16,49 +14,52 @@
 #include "softarm/config/experiment.hpp"
 #include "softarm/recording/experiment_log.hpp"
 #include "softarm/recording/tracking_summary.hpp"
+#include "softarm/transport/arm_messages.hpp"
 
 namespace softarm {
 
-/// A simulated arm's state between two of its reports.
+/// Interpolates the true state of a simulated arm between two of its messages.
 class TruthTrack {
  public:
-  void add(const softarm_messages::plant_state_t& state);
+  /// Takes the next message.
+  void add(const PlantState& state);
+  /// Whether the newest message is not before `time_us`.
   bool reaches(std::int64_t time_us) const { return after_ && after_->time_us >= time_us; }
 
-  /// True u, real pressures and tip at time_us into the row; nothing where that is not between two
-  /// reports.
+  /// Fills true u, real pressures and tip at `time_us` into the row; nothing if that is not between
+  /// the last two messages.
   void fill(std::int64_t time_us, LogRow& row) const;
 
  private:
-  std::optional<softarm_messages::plant_state_t> before_, after_;
+  std::optional<PlantState> before_, after_;
 };
 
-/// Takes the daemon's status and timing, and what a simulated arm says of itself; every status
-/// becomes a row once the truth about its instant is known, or is not to be expected any more.
+/// Takes the daemon's status and timing messages and the true states of a simulated arm. Every
+/// status becomes a row as soon as the true state at its time is known, or is no longer expected.
 class StatusRecord {
  public:
-  /// @param folder for log.csv, summary.json and timing.json; empty: no files
+  /// @param folder  for log.csv, summary.json and timing.json; empty: no files
   /// @throws std::runtime_error if the folder or a file cannot be made
   StatusRecord(const Experiment& experiment, const std::filesystem::path& folder);
 
-  /// A message of the channel, as the configuration names it; of other channels and other arms
-  /// nothing is taken. Returns whether it was a status of this arm.
+  /// Takes a message of a channel of the configuration; other channels and other arms are ignored.
+  /// Returns whether it was a status of this arm.
   bool take(std::string_view channel, std::span<const std::byte> bytes);
-
-  /// Writes the rows that are complete, or all of them.
-  void write_rows(bool all);
 
   /// Writes the last rows and the files. @throws std::runtime_error if anything could not be
   /// written
   void close();
 
-  /// What there is to say at the end, for people.
+  /// The summary at the end of a run, for a person.
   std::string table() const;
 
-  /// The newest status, and how long ago the first one was.
-  const softarm_messages::controller_status_t& status() const { return status_; }
+  /// The newest status.
+  const ArmStatus& status() const { return status_; }
+  /// Time from the first status to the newest, in s.
   double time_s() const;
+  /// Number of statuses taken.
   std::int64_t rows() const { return rows_; }
+  /// Total time in ACTIVE, in s.
   double active_s() const { return active_s_; }
 
  private:
@@ -67,6 +68,8 @@ class StatusRecord {
     LogRow row;
   };
   bool take_status(std::span<const std::byte> bytes);
+  /// The rows that are complete, or all of them.
+  void write_rows(bool all);
   std::string timing_text() const;
   std::string timing_table() const;
 
@@ -76,9 +79,8 @@ class StatusRecord {
   std::optional<ExperimentLog> log_;
   TruthTrack truth_;
   std::deque<WaitingRow> waiting_;
-  softarm_messages::controller_status_t status_{}, decoded_{};
-  bool commander_heard_ = false;  ///< a daemon that is no shadow
-  softarm_messages::plant_state_t plant_message_{};
+  ArmStatus status_;
+  bool commander_heard_ = false;  ///< the newest status was not of a shadow
   softarm_messages::timing_t timing_{};
   bool timing_received_ = false;
   std::int64_t start_us_ = 0;

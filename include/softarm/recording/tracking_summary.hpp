@@ -1,4 +1,4 @@
-// How well an experiment went, in the few numbers of summary.json.
+// The tracking errors of an experiment: the numbers of summary.json.
 #pragma once
 
 #include <array>
@@ -6,7 +6,6 @@
 #include <limits>
 #include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "softarm/estimation/frame_validator.hpp"
@@ -14,44 +13,48 @@
 
 namespace softarm {
 
-class JsonWriter;
-
-/// How well a reference was tracked, accumulated tick by tick: reference minus the plant's true u,
-/// from `tracking_from_s` after each ACTIVE on. Where the reference is a path of the tip, also when
-/// the tip came near it.
+/// Tracking errors, accumulated tick by tick: reference minus the true u of the plant, beginning
+/// `tracking_from_s` after each entry into ACTIVE. For a reference that is a path of the tip, also
+/// when the tip came near it.
 class TrackingSummary {
  public:
+  /// @param segments  number n of segments
+  /// @param tracking_from_s  time in ACTIVE before errors count, s
   TrackingSummary(int segments, double tracking_from_s);
 
-  /// Commands are moments (N m), not pressures (bar).
+  /// Declares that commands are moments (N m), not pressures (bar).
   void commands_are_torques() { torques_ = true; }
 
+  /// Adds one tick. @param period_s  of the tick
   void add(const LogRow& row, double period_s);
 
-  /// Tells what became of the frames; without it the summary does not speak of them.
+  /// Adds the frame counters to the summary, which otherwise does not contain them.
+  /// @param late  frames that arrived too late
   void set_frames(const FrameCounters& frames, std::int64_t late) {
     frames_ = frames;
     late_frames_ = late;
   }
 
-  /// Nearer than this to its path, the tip has arrived.
+  /// A tip nearer than this to its path has arrived.
   static constexpr double kTipNear_m = 0.01;
 
+  /// Time from the first row to the end of the last, s.
   double duration_s() const { return ticks_ > 0 ? last_t_s_ - first_t_s_ : 0.0; }
 
-  /// As JSON; byte-identical for identical rows.
+  /// The text of summary.json; byte-identical for identical rows.
   std::string json() const;
 
-  /// Every change of mode, in order; at most kMaxTransitions of them.
+  /// A change of mode.
   struct Transition {
     double t_s;
     Mode mode;
     Reason reason;
   };
   static constexpr std::size_t kMaxTransitions = 10'000;
+  /// The changes of mode in order, the first kMaxTransitions of them.
   const std::vector<Transition>& transitions() const { return transitions_; }
 
-  /// A table for people.
+  /// The summary as a table for a person.
   std::string table() const;
 
  private:
@@ -62,13 +65,33 @@ class TrackingSummary {
       sum += error * error;
       ++count;
     }
+    void add(const MeanSquare& other) {
+      sum += other.sum;
+      count += other.count;
+    }
     double rms() const;  ///< NaN when empty
   };
+  /// Squared errors of the tip in intervals, so that those of the second half of the run can be
+  /// summed although its beginning is not known before the end. At first an interval is one row;
+  /// whenever there are too many, neighbours are merged in pairs.
+  class TipErrors {
+   public:
+    void add(double t_s, double error_m);
+    MeanSquare since(double t_s) const;  ///< of the intervals that begin at t_s or later
+
+   private:
+    static constexpr std::size_t kMostStretches = 65'536;
+    struct Stretch {
+      double begin_s;
+      MeanSquare errors;
+    };
+    std::vector<Stretch> stretches_;
+    std::int64_t rows_a_stretch_ = 1;
+  };
+  struct Json;  ///< makes the parts of json()
   void add_tracking(const LogRow& row);
   void add_tip(const LogRow& row);
   std::string tip_line() const;
-  void write_tracking(JsonWriter& json) const;
-  void write_frames(JsonWriter& json) const;
 
   int segments_;
   double tracking_from_s_;
@@ -81,7 +104,7 @@ class TrackingSummary {
   MeanSquare u_;
   double u_max_rad_ = std::numeric_limits<double>::quiet_NaN();
   std::vector<MeanSquare> u_of_segment_, theta_, phi_;
-  std::vector<std::pair<double, double>> tip_squared_;  ///< time and squared error, for the halves
+  TipErrors tip_;
   double tip_max_m_ = std::numeric_limits<double>::quiet_NaN();
   bool tip_is_asked_ = false;    ///< the reference was a path of the tip
   double tip_last_far_s_ = 0.0;  ///< after the latest ACTIVE: when the tip was last kTipNear_m off

@@ -8,10 +8,12 @@
 #include <array>
 #include <cstdint>
 #include <limits>
+#include <memory>
 #include <span>
 
 #include "softarm/actuation/pressure_allocator.hpp"
 #include "softarm/actuation/pressure_ramps.hpp"
+#include "softarm/base/time.hpp"
 #include "softarm/control/curvature_controller.hpp"
 #include "softarm/control/reference.hpp"
 #include "softarm/estimation/curvature_filter.hpp"
@@ -21,6 +23,8 @@
 #include "softarm/runtime/settings.hpp"
 
 namespace softarm {
+
+class ModelObserver;
 
 /// A live reference as it came over the wire: 2n numbers each; rad, rad/s, rad/s^2.
 struct LiveReferenceInput {
@@ -32,18 +36,15 @@ struct TickInput {
   std::int64_t now_ns = 0;
   std::span<const MocapFrame> frames;  ///< in order of arrival, capture times on our clock
   const LiveReferenceInput* reference = nullptr;  ///< the newest, if one came
-  bool arm = false;
-  bool disarm = false;
-  bool emergency_stop = false;
-  bool shutdown = false;         ///< from now on: vent, and nothing else
-  bool command_expired = false;  ///< so long ago was one sent that the valves have vented meanwhile
+  OperatorRequests requests = {};
+  bool command_expired = false;  ///< the last one sent has expired: the valves have vented
   int consecutive_overruns = 0;  ///< ticks missed in a row; zero where they are not to be judged
   /// Arrival of the newest pressure measurement, where the valves publish them.
-  std::int64_t newest_measurement_ns = SafetyInput::kNever;
+  std::int64_t newest_measurement_ns = kNever;
   /// The measured pressures (bar, one a chamber), if some came since the last tick.
   const PressureVector* measured_bar = nullptr;
   /// Arrival of the newest "go", where there is a dead-man input.
-  std::int64_t newest_go_ns = SafetyInput::kNever;
+  std::int64_t newest_go_ns = kNever;
 };
 
 /// What the tick saw, decided and commands.
@@ -59,8 +60,14 @@ struct TickOutput {
   bool bounded = false;     ///< the controller bounded something near a singularity
   std::int64_t frame_number = -1;                                 ///< newest accepted frame
   double frame_age_s = std::numeric_limits<double>::quiet_NaN();  ///< now minus its capture
-  FilteredMotion motion;      ///< u and u' predicted to the middle of the period that begins now
-  ReferenceSample reference;  ///< at the same instant; empty unless ACTIVE
+  /// u and u' predicted to the middle of the period that begins now; of the model-based observer,
+  /// later by control.delay_s, when the command acts.
+  FilteredMotion motion;
+  /// In the middle of the period that begins now; empty unless ACTIVE.
+  ReferenceSample reference;
+  /// Correction of the model, its deviations and the innovations; null without a model-based
+  /// observer, and while it does not run and `motion` is the kinematic filter's.
+  const ModelObserver* observer = nullptr;
   SegmentVector tau_actuation_nm;  ///< (17); empty unless ACTIVE
   PressureVector pressure_bar;     ///< to be sent
 };
@@ -69,13 +76,18 @@ struct TickOutput {
 /// allocates nothing and throws nothing after construction.
 class ControlPipeline {
  public:
-  /// @throws std::invalid_argument as the rooms it is made of, for settings that do not fit
-  /// together
+  /// @throws std::invalid_argument for settings that do not fit together, as the modules it is
+  /// composed of
   explicit ControlPipeline(const PipelineSettings& settings);
+  ~ControlPipeline();
 
+  /// One tick: validate, estimate, safety, control (17), allocate, limit. To be called once per
+  /// period with increasing times; the result is valid until the next call.
   const TickOutput& tick(const TickInput& input) noexcept;
 
+  /// Result of the latest tick.
   const TickOutput& output() const noexcept { return output_; }
+  /// Frames accepted, rejected and missing since the start.
   const FrameCounters& counters() const noexcept { return validator_.counters(); }
   /// Dropped for their age: captured more than max_latency_s ago, or not yet.
   std::int64_t late_frames() const noexcept { return late_frames_; }
@@ -83,6 +95,7 @@ class ControlPipeline {
   const CurvatureEstimate& estimate() const noexcept { return validator_.estimate(); }
   /// Every commanded pressure is zero.
   bool fully_vented() const noexcept { return output_.pressure_bar.isZero(0.0); }
+  /// Period of the tick, 1/rate_hz.
   std::int64_t period_ns() const noexcept { return period_ns_; }
 
  private:
@@ -90,22 +103,22 @@ class ControlPipeline {
   void validate_and_estimate(const TickInput& input, SafetyInput& safety) noexcept;
   void watch(const TickInput& input, SafetyInput& safety) noexcept;
   void use_frame(const MocapFrame& frame) noexcept;
-  void predict(std::int64_t at_ns) noexcept;
+  void predict(std::int64_t now_ns, std::int64_t at_ns) noexcept;
   void expect(std::int64_t at_ns) noexcept;
   void take_reference(const TickInput& input) noexcept;
-  void control() noexcept;
+  void control(std::int64_t act_ns) noexcept;
   void limit(Mode mode) noexcept;
   bool poses_frozen() const noexcept;
   bool beyond_soft_limit(bool speed_too) const noexcept;
-  double seconds(std::int64_t time_ns) const noexcept {
-    return 1e-9 * static_cast<double>(time_ns - epoch_ns_);
-  }
+  double seconds(std::int64_t time_ns) const noexcept { return to_seconds(time_ns - epoch_ns_); }
 
   PipelineSettings settings_;
   std::int64_t period_ns_;
   double period_s_;
   FrameValidator validator_;
   CurvatureFilter filter_;
+  std::unique_ptr<ModelObserver> observer_;  ///< where it is configured
+  std::int64_t delay_ns_;                    ///< that they and the controller look ahead by
   SafetyMonitor safety_;
   Reference reference_;
   CurvatureController controller_;
@@ -121,11 +134,12 @@ class ControlPipeline {
   Allocation allocation_;
   PressureVector previous_bar_;
   SegmentVector previous_tau_nm_;               ///< that these give
+  SegmentVector commanded_tau_nm_;              ///< scratch of what is sent now
   PressureVector pressure_at_last_motion_bar_;  ///< commanded when the poses last changed
   std::array<std::int64_t, kMaxSegments> seen_ns_{};
   std::int64_t epoch_ns_ = 0;
   std::int64_t previous_ns_ = 0;
-  std::int64_t newest_capture_ns_ = 0;
+  std::int64_t newest_capture_ns_ = kNever;
   std::int64_t late_frames_ = 0;
   std::uint32_t activations_ = 0;
   bool ticked_ = false;

@@ -1,5 +1,5 @@
-// Does the arm do what it is told? Measured pressures against the commanded ones, curvature against
-// pressure.
+// Checks that the arm follows its commands: measured against commanded pressures, curvature against
+// pressures.
 #pragma once
 
 #include <cstdint>
@@ -12,28 +12,29 @@
 namespace softarm {
 
 /// A valve, however slow, gives a pressure between the smallest and the largest of its latest
-/// commands. A measured pressure outside that range is one that does not follow: a burst, a leak, a
-/// blocked tube, a valve that is not ours. The range spans at least the settling time, at most
-/// twice that. No allocation, no clock.
+/// commands. A measured pressure outside that range does not follow: a burst, a leak, a blocked
+/// tube, a wrong valve. The range spans at least the settling time, at most twice that. No
+/// allocation, no clock.
 class PressureWatch {
  public:
-  /// Measurements in a row that must stray: one may be a disturbance.
+  /// Consecutive measurements that must be out of tolerance: a single one may be a disturbance.
   static constexpr int kInRow = 3;
 
+  /// Tolerance and settling time of the settings, for `chambers` chambers of the arm.
   PressureWatch(const SafetySettings& settings, int chambers) noexcept;
 
-  /// What is commanded from `now_ns` on (bar, one a chamber).
+  /// The pressures commanded from `now_ns` on (bar, one per chamber).
   void command(std::int64_t now_ns, const PressureVector& commanded_bar) noexcept;
 
-  /// The next measurement (bar, one a chamber). Believed whatever it says until the commands of a
+  /// The next measurement (bar, one per chamber). Any value is accepted until the commands of a
   /// whole settling time are known.
   void measure(const PressureVector& measured_bar) noexcept;
 
-  /// Forgets everything: for a gap in which valves may have vented by themselves.
+  /// Clears the history, after a gap in which the valves may have vented by themselves.
   void reset() noexcept;
 
-  /// The latest measurements were more than the tolerance outside of the range.
-  bool strays() const noexcept { return in_row_ >= kInRow; }
+  /// The last kInRow measurements were outside the range by more than the tolerance.
+  bool out_of_tolerance() const noexcept { return in_row_ >= kInRow; }
 
  private:
   struct Range {
@@ -42,28 +43,30 @@ class PressureWatch {
 
   double tolerance_bar_;
   std::int64_t settling_ns_;
-  Range now_, before_;  // of the settling time that runs, and of the one before it
+  Range now_, before_;  // of the current settling time and of the previous one
   std::int64_t since_ns_ = 0;
-  int known_ = 0;  // of the two
+  int known_ = 0;  // how many of the two are known
   int in_row_ = 0;
 };
 
-/// At rest a segment balances: K u + G(u) = A(u) tau_A. A residual that stays means the model or
-/// the arm is wrong: an obstacle, a burst chamber, a body that slipped. It cannot be told from a
-/// wrong model or from inertia and damping of a fast motion, so the limit must exceed both. O(n),
-/// no allocation, no clock.
+/// At rest a segment balances: K u + G(u) = A(u) tau_A. A persistent residual means that the model
+/// or the arm is wrong: an obstacle, a burst chamber, a marker body that slipped. It cannot be
+/// distinguished from a model error or from inertia and damping in fast motion, so the limit must
+/// exceed both. O(n), no allocation, no clock.
 class CurvatureWatch {
  public:
   /// @throws std::invalid_argument as DynamicsWorkspace
   CurvatureWatch(const SafetySettings& settings, const ArmParameters& arm);
 
-  /// u: 2n, rad; tau_actuation: 2n, N m, of the pressures in force. What is not to be judged is
-  /// left out: a gap longer than the settling time begins anew.
+  /// u: 2n, rad; tau_actuation: 2n, N m, of the pressures in force. Skip ticks that are not to be
+  /// judged: after a gap longer than the settling time the check starts again.
   void judge(std::int64_t now_ns, ConstVectorRef u_rad, ConstVectorRef tau_actuation_nm) noexcept;
 
+  /// Whether the settings have a limit.
   bool used() const noexcept { return limit_nm_ > 0.0; }
   /// Some segment's residual was above the limit throughout the settling time.
-  bool strays() const noexcept { return strays_; }
+  bool out_of_tolerance() const noexcept { return strays_; }
+  /// Starts again, for a gap in which the arm was not under control.
   void reset() noexcept { strays_ = beyond_ = false; }
 
  private:
@@ -73,7 +76,7 @@ class CurvatureWatch {
   std::int64_t settling_ns_;
   ArmParameters arm_;
   DynamicsWorkspace workspace_;
-  SegmentVector at_rest_, force_, actuated_;
+  SegmentVector force_, actuated_;
   std::int64_t since_ns_ = 0;
   bool beyond_ = false;
   bool strays_ = false;

@@ -1,4 +1,4 @@
-// What there is to say about one tick of an experiment.
+// The logged quantities of one tick of an experiment.
 #pragma once
 
 #include <limits>
@@ -11,7 +11,7 @@
 
 namespace softarm {
 
-/// One tick. Vectors may be left empty where a quantity is not known; its cells stay empty.
+/// One tick. A vector is empty where its quantity is not known; its cells then stay empty.
 struct LogRow {
   double t_s = 0.0;
   Mode mode = Mode::init;
@@ -20,15 +20,15 @@ struct LogRow {
   double frame_age_s = std::numeric_limits<double>::quiet_NaN();
   SegmentVector u, velocity, reference, truth;        ///< 2n each, rad and rad/s
   SegmentVector tau_actuation;                        ///< 2n, N m
-  SegmentVector residual_twist, residual_length;      ///< n each, rad and m
+  SegmentVector residual_torsion, residual_length;    ///< n each, rad and m
   PressureVector commanded, real;                     ///< bar
   std::optional<Eigen::Vector3d> tip, tip_reference;  ///< m, world
   bool tip_is_asked =
       false;  ///< tip_reference is a path of the tip (22), not the model's tip at u_ref
-  Eigen::VectorXd coordinates;  ///< the simulated arm's own: of its segments, pieces or joints, rad
+  Eigen::VectorXd coordinates;  ///< of the simulated arm's segments, pieces or joints, rad
 };
 
-/// What a pipeline knows of its tick; the plant's truth is not its to tell.
+/// The row of a pipeline's tick, without the quantities that only the simulated arm knows.
 void fill_from_pipeline(const ControlPipeline& pipeline, const ArmParameters& arm, LogRow& row);
 
 }  // namespace softarm

@@ -6,11 +6,12 @@
 #include <limits>
 #include <span>
 
+#include "softarm/base/time.hpp"
 #include "softarm/runtime/settings.hpp"
 
 namespace softarm {
 
-/// What the daemon does with the valves. The order is the order of severity from `active` on.
+/// What the daemon does with the valves. From `active` on in order of severity.
 enum class Mode : std::int8_t {
   init,         ///< before the first tick
   wait_frames,  ///< vented, until good frames come and the arm is armed
@@ -20,8 +21,8 @@ enum class Mode : std::int8_t {
   fault         ///< like `vent`, and latched until an operator disarms
 };
 
-/// Why the mode is what it is; `cause_table` says what each demands and what clears it. The numbers
-/// go over the wire: new ones are added at the end.
+/// Reason of the mode; `cause_table` has what each demands and what clears it. The numbers go over
+/// the wire: add new ones at the end.
 enum class Reason : std::int8_t {
   none,
   starting,
@@ -50,8 +51,9 @@ inline constexpr int kReasons = static_cast<int>(Reason::command_expired) + 1;
 const char* name(Mode mode) noexcept;
 const char* name(Reason reason) noexcept;
 
-/// What it takes, once a cause is gone, until the arm may be active again. Always `good_frames`
-/// good frames in a row, after VENT and FAULT counted from when the arm is fully vented.
+/// What is required, once a cause is gone, before the arm may become active again. Always
+/// `good_frames` good frames in a row, after VENT and FAULT counted from when the arm is fully
+/// vented.
 enum class Clearance : std::int8_t {
   good_frames,      ///< no more than that; after VENT an `arm` too, with explicit arming
   arm,              ///< an operator's `arm`, with automatic arming too
@@ -65,7 +67,7 @@ struct CauseRule {
   Mode demands;
   Clearance clearance;
 };
-/// Every cause; of those present the first one counts.
+/// Every cause; of those present the first one applies.
 std::span<const CauseRule> cause_table() noexcept;
 
 /// Times after which silence has consequences, resolved from settings and control period.
@@ -75,13 +77,21 @@ struct SafetyThresholds {
   std::int64_t valve_silence_ns;
   std::int64_t deadman_timeout_ns;
 };
+/// Times given in the settings (s); where zero, derived from control and frame period T and T_f: HOLD
+/// after max(3 T, 3 T_f + latency), VENT after max(0.1 s, 10 T_f, 3 T).
 SafetyThresholds resolve_thresholds(const SafetySettings& settings,
                                     double control_period_s) noexcept;
 
-/// What the monitor is told in one tick. Times are of one monotonic clock, in ns.
-struct SafetyInput {
-  static constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::min();
+/// Requests of an operator or of the program to the tick; several may be set at once.
+struct OperatorRequests {
+  bool arm = false;
+  bool disarm = false;
+  bool emergency_stop = false;
+  bool shutdown = false;  ///< from now on: vent, and nothing else
+};
 
+/// Inputs of the monitor in one tick. Times are of one monotonic clock, in ns.
+struct SafetyInput {
   std::int64_t now_ns = 0;
   std::int64_t newest_capture_ns = kNever;  ///< of the segment seen longest ago
   bool motion_unknown = false;              ///< u of some segment is not known at this tick
@@ -95,32 +105,35 @@ struct SafetyInput {
   std::int64_t newest_measurement_ns = kNever;  ///< of the valves' read-back
   bool pressure_mismatch = false;               ///< measured pressures do not follow the commands
   bool curvature_mismatch = false;              ///< the arm is not where its pressures would put it
-  bool command_expired = false;                 ///< the valves have vented for want of a command
-  bool deadman_used = false;                    ///< there is a dead-man input
-  std::int64_t newest_go_ns = kNever;           ///< of that
-  bool arm = false;
-  bool disarm = false;
-  bool emergency_stop = false;
-  bool shutdown = false;
+  bool command_expired = false;        ///< the last command expired: the valves have vented
+  bool deadman_used = false;           ///< there is a dead-man input
+  std::int64_t newest_go_ns = kNever;  ///< arrival of the newest "go"
+  OperatorRequests requests = {};
 };
 
 /// Reads no clock, allocates nothing, throws nothing. Transitions follow the severity of the causes
-/// present: the most severe wins. Valves count as silent for as long as the monitor was stepped and
-/// did not hear them: what arrived while the daemon was stopped may have been dropped. After such a
-/// stop, or where commands did not reach the valves in time, no frame is good before they have been
-/// heard again, and for half a second neither frames nor an `arm` count: they may be older than
-/// they look.
-/// While nothing is pressurised (WAIT_FRAMES) a cause that demands HOLD or VENT only keeps the arm
-/// from becoming active; with explicit arming one that demands VENT takes the arming back.
+/// present: the most severe wins. The silence of the valves counts only while the monitor is
+/// stepped: measurements that arrived while the daemon was stopped may have been dropped. After
+/// such a stop, or where commands did not reach the valves in time, no frame is good before a new
+/// measurement arrives, and for half a second neither frames nor an `arm` count: they may be older
+/// than they look. While nothing is pressurised (WAIT_FRAMES) a cause that demands HOLD or VENT
+/// only keeps the arm from becoming active; with explicit arming one that demands VENT takes the
+/// arming back.
 class SafetyMonitor {
  public:
+  /// Starts in Mode::init; armed if the settings arm automatically.
   SafetyMonitor(const SafetySettings& settings, double control_period_s) noexcept;
 
+  /// The mode of this tick. To be called once per tick, with times that never go back.
   Mode step(const SafetyInput& input) noexcept;
 
+  /// Mode after the latest step.
   Mode mode() const noexcept { return mode_; }
+  /// Reason of the mode; none in ACTIVE.
   Reason reason() const noexcept { return reason_; }
+  /// Whether the arm may become active once nothing else prevents it.
   bool armed() const noexcept { return armed_; }
+  /// The resolved thresholds.
   const SafetyThresholds& thresholds() const noexcept { return thresholds_; }
 
  private:
@@ -137,8 +150,8 @@ class SafetyMonitor {
   bool armed_;
   int good_in_a_row_ = 0;
   std::int64_t previous_tick_ns_ = 0;
-  std::int64_t listening_since_ns_ = SafetyInput::kNever;  ///< end of the last stop, for the valves
-  std::int64_t deaf_until_ns_ = SafetyInput::kNever;       ///< to `arm` and frames, after a stop
+  std::int64_t listening_since_ns_ = kNever;  ///< end of the last stop, for the valves
+  std::int64_t deaf_until_ns_ = kNever;       ///< to `arm` and frames, after a stop
 };
 
 }  // namespace softarm

@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "softarm/base/time.hpp"
 #include "softarm/estimation/mocap_frame.hpp"
 #include "softarm/simulation/random.hpp"
 #include "softarm/simulation/settings.hpp"
@@ -19,8 +20,6 @@ namespace softarm {
 /// does not change the other.
 class MocapSimulator {
  public:
-  static constexpr std::int64_t kNever = INT64_MAX;
-
   /// @param segments number of measured segment ends, 1..kMaxSegments.
   /// @param start_ns time of the first capture.
   /// @throw std::invalid_argument for a rate outside (0, 1e6] Hz, a negative or not finite latency
@@ -36,7 +35,7 @@ class MocapSimulator {
   void capture(const Eigen::Isometry3d& base,
                std::span<const Eigen::Isometry3d> segment_ends) noexcept;
 
-  /// When the oldest frame under way arrives; kNever if there is none.
+  /// When the oldest frame under way arrives; kForever if there is none.
   std::int64_t next_arrival_ns() const noexcept;
 
   /// The oldest frame that has arrived by `now_ns`, if any, in order of capture. Frames nobody

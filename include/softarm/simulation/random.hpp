@@ -10,7 +10,7 @@ namespace softarm {
 /// xoshiro256++ seeded by splitmix64, with uniform and normal numbers of its own.
 class RandomNumbers {
  public:
-  /// @param stream tells independent sequences of one seed apart (noise, dropouts, ...).
+  /// @param stream selects one of the independent sequences of a seed (noise, dropouts, ...).
   explicit RandomNumbers(std::uint64_t seed, std::uint64_t stream = 0) noexcept;
 
   std::uint64_t bits() noexcept;  ///< 64 uniform bits

@@ -1,108 +1,48 @@
 // What an experiment says about the simulated arm: its parameters, valves, sensing and integrator.
+// config/template.yaml documents every setting.
 #pragma once
 
 #include <cstdint>
-#include <optional>
-#include <string>
 #include <vector>
 
 #include "softarm/actuation/settings.hpp"
 #include "softarm/model/arm.hpp"
+#include "softarm/simulation/external_loads.hpp"
+#include "softarm/simulation/plant_kinds.hpp"
 
 namespace softarm {
 
 /// First-order valves between a commanded and a real pressure. Left out (lag 0): the command is the
 /// pressure. With actuation by torque, read N m for bar.
 struct ValveSettings {
-  double lag_s = 0.0;                ///< time constant
-  double supply_pressure_bar = 2.0;  ///< no pressure above it
-  double dead_time_s = 0.0;     ///< from the arrival of a command until the valves begin to act
-  double slew_bar_per_s = 0.0;  ///< largest rate of a real pressure; 0: as fast as the lag lets it
-  double resolution_bar = 0.0;  ///< of the set points: rounded to whole multiples; 0: exact
+  double lag_s = 0.0;
+  double supply_pressure_bar = 2.0;
+  double dead_time_s = 0.0;
+  double slew_bar_per_s = 0.0;
+  double resolution_bar = 0.0;
 };
 
 /// Simulated motion capture.
 struct MocapSettings {
   double rate_hz = 200.0;
-  double latency_s = 0.0;         ///< from capture to arrival of the message
-  double position_noise_m = 0.0;  ///< standard deviation an axis of every body
-  double orientation_noise_rad =
-      0.0;  ///< standard deviation of the rotation vector an axis of every body
-  double position_resolution_m = 0.0;  ///< positions are rounded to whole multiples; 0: exact
-  double dropout_probability = 0.0;    ///< of a whole frame, independent from frame to frame
-  bool noise_on_base = true;           ///< the base is a measured body too, unless it is fixed
+  double latency_s = 0.0;
+  double position_noise_m = 0.0;
+  double orientation_noise_rad = 0.0;
+  double position_resolution_m = 0.0;
+  double dropout_probability = 0.0;
+  bool noise_on_base = true;
 };
 
-/// What the simulated arm is made of.
-enum class PlantKind {
-  pcc,      ///< the model itself: one constant-curvature piece a segment
-  refined,  ///< several constant-curvature pieces a segment; converges to a bending rod
-  links     ///< the paper's section VI: rigid links joined by two crossed revolute joints
-};
-
-/// `PlantKind::refined`. Weights tell how a segment's length, mass and bending rigidity E I (and
-/// damping with it) vary along it, one number a piece; empty: all alike. Only their ratios count:
-/// length, mass, and the bend under a uniform moment stay those of the segment.
-struct RefinedSettings {
-  int pieces = 8;  ///< a segment; kMaxSegments pieces at most in the whole arm
-  std::vector<double> length_weights;
-  std::vector<double> mass_weights;
-  std::vector<double> rigidity_weights;
-};
-
-inline constexpr int kMaxLinksPerSegment = 64;
-
-/// In which pair of angles the two joints of a link are told.
-enum class LinkJoints {
-  crossed,  ///< a about x, then b about y: smooth
-  polar  ///< the paper's phi and theta, (a, b) = theta (-sin phi, cos phi): singular where straight
-};
-
-/// `PlantKind::links`. Stiffness and damping act about each of the two axes of a joint; left out
-/// they are those of the segment times the number of its links, so that equal moments on the joints
-/// bend it as they bend the segment.
-struct LinkSettings {
-  int links_per_segment = 6;
-  LinkJoints joints = LinkJoints::crossed;
-  std::optional<double> joint_stiffness_nm_per_rad;
-  std::optional<double> joint_damping_nms_per_rad;
-};
-
-/// How an external load changes in time.
-enum class LoadShape {
-  constant,  ///< switched on and off
-  half_sine  ///< a blow: half a sine wave over the duration
-};
-
-/// A force and a moment on the end of a segment, in world axes.
-struct ExternalLoad {
-  int segment = 0;  ///< 1..n from the base; 0: the tip
-  Eigen::Vector3d force_n = Eigen::Vector3d::Zero();
-  Eigen::Vector3d moment_nm = Eigen::Vector3d::Zero();
-  LoadShape shape = LoadShape::constant;
-  double start_s = 0.0;
-  double duration_s = 0.0;  ///< 0: for ever (a constant load only)
-};
-
-/// A base that is carried to and fro, without turning: base_position + amplitude sin(2 pi frequency
-/// t + phase).
-struct BaseMotion {
-  Eigen::Vector3d amplitude_m = Eigen::Vector3d::Zero();  ///< world axes
-  double frequency_hz = 0.0;
-  double phase_rad = 0.0;
-};
-
-/// Which method of SUNDIALS integrates. The first three are diagonally implicit Runge-Kutta methods
-/// (stiffly accurate, no explicit first stage): a sampled command costs them nothing. The multistep
-/// methods start anew wherever the torque itself jumps. All but `erk` work on the O(n) residual.
+/// Which method of SUNDIALS integrates; docs/results/plant_methods.md has what each costs. The
+/// first three are diagonally implicit Runge-Kutta methods (stiffly accurate, no explicit first
+/// stage): a sampled command costs them nothing. All but `erk` work on the O(n) residual.
 enum class IntegratorMethod {
-  sdirk2,       ///< ARKODE: Alexander's two stages, order 2
-  cash4,        ///< ARKODE: Cash's five stages, order 4, embedded order 3
-  sdirk4,       ///< ARKODE: Hairer and Wanner's five stages, order 4, embedded order 3
-  erk,          ///< ARKODE: Dormand and Prince, explicit, order 5: for arms that are not stiff
-  cvode_bdf,    ///< CVODE: backward differences, order 1 to 5
-  cvode_adams,  ///< CVODE: Adams and Moulton, order 1 to 12: for arms that are not stiff
-  ida           ///< IDA: backward differences on r(t, x, v, v') = 0 itself, order 1 to 5
+  sdirk2,    ///< ARKODE: Alexander's two stages, order 2: least work under a sampled command
+  cash4,     ///< ARKODE: Cash's five stages, order 4: least error under a sampled command
+  sdirk4,    ///< ARKODE: Hairer and Wanner's five stages, order 4: least error of a free motion
+  erk,       ///< ARKODE: Dormand and Prince, order 5, on the explicit x'': an independent check
+  cvode_bdf  ///< CVODE: backward differences, order 1 to 5: fastest in a smooth motion; starts
+             ///< again wherever the torque itself jumps
 };
 
 /// The absolute tolerance of u' (rad/s) over that of u (rad), in 1/s.
@@ -117,19 +57,16 @@ struct IntegratorCounters {
   std::int64_t retries = 0;  ///< calls that failed once and then succeeded
 };
 
-/// The simulated arm. Its `arm` and `actuation` may differ from what the controller believes.
+/// The simulated arm. Its `arm` and `actuation` may differ from the controller's model.
 struct PlantSettings {
-  PlantKind kind = PlantKind::pcc;
-  RefinedSettings refined;
-  LinkSettings links;
+  PlantKind kind;  ///< what it is made of
   ArmParameters arm;
   ActuationSettings actuation;
   ValveSettings valves;
   MocapSettings mocap;
   /// At rest. Where a segment has several parts, each takes its share, as under a uniform moment.
   SegmentVector initial_u_rad;
-  Eigen::Vector3d tip_force_n =
-      Eigen::Vector3d::Zero();  ///< constant external force at the tip, world frame
+  Eigen::Vector3d tip_force_n = Eigen::Vector3d::Zero();
   std::vector<ExternalLoad> loads;
   std::vector<double> payload_kg;  ///< point masses on the segments' ends; empty: none, else n
   BaseMotion base_motion;
@@ -138,8 +75,8 @@ struct PlantSettings {
   /// torque than a motion shows, and steps short enough to be far more exact than these.
   double relative_tolerance = 1e-3;
   double absolute_tolerance = 1e-4;  ///< of u (rad); kVelocityTolerance times that of u' (rad/s)
-  double max_step_s = 1e-3;          ///< 0: as long as the tolerances allow
-  bool account_energy = false;       ///< integrate work and dissipation along
+  double max_step_s = 1e-3;
+  bool account_energy = false;  ///< integrate work and dissipation along
   std::uint64_t seed = 1;
 };
 

@@ -7,6 +7,7 @@
 
 #include "softarm/actuation/command_expiry.hpp"
 #include "softarm/actuation/pressure_allocator.hpp"
+#include "softarm/base/time.hpp"
 #include "softarm/simulation/arm_plant.hpp"
 #include "softarm/simulation/mocap_simulator.hpp"
 #include "softarm/simulation/settings.hpp"
@@ -28,7 +29,7 @@ class SimulatedArm {
   /// valid for longer than `longest_validity_ns`.
   /// @throw std::invalid_argument as ArmPlant and MocapSimulator.
   SimulatedArm(const PlantSettings& settings, std::int64_t start_ns,
-               std::int64_t longest_validity_ns = CommandExpiry::kNever);
+               std::int64_t longest_validity_ns = kForever);
 
   /// Takes a command that arrives at `arrival_ns`, first letting time pass until then. @throw
   /// PlantError.

@@ -14,7 +14,7 @@ class SimulatedOperator {
   /// @param next its arm request and dead-man input are written; its time must be set
   void attend(const TickOutput& previous, TickInput& next) noexcept {
     started_ |= previous.mode == Mode::active;
-    next.arm = !started_ && previous.reason == Reason::waiting_for_arm;
+    next.requests.arm = !started_ && previous.reason == Reason::waiting_for_arm;
     next.newest_go_ns = next.now_ns;
   }
 

@@ -1,4 +1,4 @@
-// When did a packet arrive, on our monotonic clock? LCM stamps it with the wall clock.
+// Converts arrival times of packets, which LCM stamps with the wall clock, to our monotonic clock.
 #pragma once
 
 #include <cstdint>
@@ -7,25 +7,27 @@
 
 namespace softarm {
 
-/// Brings LCM's receive stamps (the kernel's wall clock, as the packet came in) to our monotonic
-/// clock. The difference of the clocks is read at every look. Where the wall clock was set between
-/// two looks, a stamp belongs to the clock before or after, and the later arrival of those that can
-/// be true counts: a clock that is set never makes a packet older than it is, and younger by no
-/// more than the time from its arrival to the look. Allocates nothing, throws nothing, reads no
-/// clock.
+/// Converts LCM's receive stamps (the wall clock of the kernel when the packet came in) to our
+/// monotonic clock. The difference of the clocks is updated by every `look`. If the wall clock was
+/// set between two looks, a stamp may belong to the clock before or after; of the possible arrivals
+/// the later one counts. So setting the clock never makes a packet appear older than it is, and
+/// younger by no more than the time from its arrival to the look. Allocates nothing, throws
+/// nothing, reads no clock.
 class ArrivalClock {
  public:
-  /// For so long a packet may have waited, in the kernel or in LCM's queue, before the look before.
+  /// Longest time that a packet may have waited in the kernel or in LCM's queue before the previous
+  /// look.
   static constexpr std::int64_t kLongestWait_ns = 100'000'000;
 
-  /// As `look`, for the first time.
+  /// The first `look`.
   ArrivalClock(std::int64_t monotonic_ns, std::int64_t wall_ns) noexcept;
 
-  /// Both clocks, read together. What is asked about from here on has arrived by `monotonic_ns`.
+  /// Takes both clocks, read together. Packets passed to `arrival_ns` from here on arrived by
+  /// `monotonic_ns`.
   void look(std::int64_t monotonic_ns, std::int64_t wall_ns) noexcept;
 
-  /// The arrival of a packet stamped `stamp_us`, asked about in order of arrival: does not
-  /// decrease. That of the look for a stamp that cannot be true.
+  /// Arrival of a packet stamped `stamp_us`, in ns of the monotonic clock. Call in order of
+  /// arrival; the results do not decrease. For an impossible stamp it is the time of the look.
   std::int64_t arrival_ns(std::int64_t stamp_us) noexcept;
 
  private:

@@ -1,4 +1,4 @@
-// The daemon's side of LCM: what came in since the last tick, and what goes out after it.
+// The daemon's side of LCM: inputs since the last tick, and outputs after it.
 #pragma once
 
 #include <cstdint>
@@ -21,43 +21,49 @@
 
 namespace softarm {
 
-/// The four durations the daemon measures of itself.
+/// The four durations that the daemon measures, and its counters.
 struct LoopTiming {
   DurationHistogram lateness;   ///< wake-up after the deadline
   DurationHistogram frame_age;  ///< capture of the newest frame to the tick
   DurationHistogram tick;       ///< from wake-up to the command
   DurationHistogram publish;    ///< publishing command and status
   std::int64_t ticks = 0;
-  std::int64_t overruns = 0;
+  std::int64_t overruns = 0;  ///< deadlines missed
 };
 
-/// Belongs to the tick's thread. After construction nothing here allocates, waits or throws.
+/// Collects the inputs of a tick and publishes its outputs. Use from the thread of the tick. After
+/// construction nothing allocates, waits or throws.
 class DaemonLink {
  public:
+  /// @param shadow  mark commands as computed for inspection only
   /// @throws TransportError
   DaemonLink(const PipelineSettings& settings, const TransportSettings& transport,
              const Provenance& provenance, bool shadow);
 
-  /// Handles what has arrived, a bounded number of messages. The frames it points to live until the
-  /// next call.
+  /// Handles the messages that have arrived, a bounded number. The frames that the result points to
+  /// are valid until the next call.
   TickInput collect(std::int64_t now_ns) noexcept;
 
-  /// Pressures, or torques where these actuate: another type, which no valve terminal decodes. What
-  /// was decided before the command before it expired, and comes after that, is not sent: it would
-  /// be a step up from vented valves. The next tick hears of it (TickInput::command_expired).
+  /// Publishes pressures, or torques where actuation is by torque (another type, which no valve
+  /// terminal decodes). If the previous command expired while this one was being decided, it is not
+  /// sent, because it would be a step up from vented valves; the next tick is informed by
+  /// TickInput::command_expired.
   void publish_command(std::int64_t now_ns, const TickOutput& output) noexcept;
+  /// Publishes the status of the tick, with overruns from `timing`.
   void publish_status(std::int64_t now_ns, const ControlPipeline& pipeline,
                       const LoopTiming& timing) noexcept;
+  /// Publishes the histograms of `timing`.
   void publish_timing(std::int64_t now_ns, const LoopTiming& timing) noexcept;
-  /// What the tick of the last command was given, and the record of TickRecorder::kRepeatAfter
-  /// ticks ago once more. Nothing where no channel is configured for it.
+  /// Publishes the inputs of the tick of the last command, and again the record of
+  /// TickRecorder::kRepeatAfter ticks ago. Does nothing if no channel is configured for it.
   void publish_record(const TickInput& input, const TickOutput& output) noexcept;
-  /// Sends the oldest record that has been sent only once; false if there is none. For the end,
-  /// when no tick follows.
+  /// Repeats the oldest record that has been sent only once; false if there is none. For the end of
+  /// a run, when no tick follows.
   bool repeat_record() noexcept;
 
-  /// Messages refused before decoding; publications that failed, and commands that came too late.
+  /// Messages that could not be decoded.
   std::int64_t malformed() const noexcept { return malformed_; }
+  /// Publications that failed, and commands that were too late to send.
   std::int64_t unsent() const noexcept { return unsent_; }
 
  private:
@@ -76,7 +82,7 @@ class DaemonLink {
   OutputMessages messages_;
   std::optional<TickRecorder> recorder_;
 
-  // What the handlers fill during collect().
+  // Filled by the handlers during collect().
   std::vector<MocapFrame> frames_;
   std::size_t frame_count_ = 0;
   LiveReferenceInput reference_;
@@ -86,12 +92,12 @@ class DaemonLink {
   std::int64_t newest_go_ns_;
   std::int64_t go_sequence_;
   PressureVector measured_bar_;
-  std::int64_t newest_reference_ns_ = 0;
-  std::int64_t newest_operator_ns_ = 0;
+  std::int64_t newest_reference_ns_ = kNever;
+  std::int64_t newest_operator_ns_ = kNever;
   std::int64_t reference_sequence_;
   std::int64_t operator_sequence_;
   std::int64_t commands_ = 0;
-  std::int64_t sent_us_ = 0;  ///< the newest command, as it says itself
+  std::int64_t sent_us_ = kNever;  ///< time in the newest command
   std::int64_t malformed_ = 0;
   std::int64_t unsent_ = 0;
 

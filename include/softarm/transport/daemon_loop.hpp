@@ -1,4 +1,4 @@
-// The control pipeline in real time, joined to LCM: what softarmd runs.
+// The control pipeline in real time, connected to LCM: the loop of softarmd.
 #pragma once
 
 #include <cstdint>
@@ -9,13 +9,14 @@
 
 namespace softarm {
 
-/// Keeps the deadline, and the account of how well it was kept. Belongs to the tick's thread.
+/// Runs the tick at its deadlines and records how well they were kept. Use from the thread of the
+/// tick.
 class DaemonLoop {
  public:
-  /// After each tick.
+  /// Passed to the callback after each tick.
   struct Report {
     std::int64_t woken_ns;        ///< CLOCK_MONOTONIC
-    std::int64_t since_start_ns;  ///< of run()
+    std::int64_t since_start_ns;  ///< since the start of run()
     bool on_time;                 ///< the next tick's deadline was kept
     bool stopping;                ///< a stop was requested
   };
@@ -24,13 +25,16 @@ class DaemonLoop {
   DaemonLoop(const PipelineSettings& settings, const TransportSettings& transport,
              const Provenance& provenance, bool shadow);
 
-  /// Ticks until `stop_requested` says so and every pressure has been commanded to zero.
-  /// Neither allocates nor throws, as long as the functions do not.
+  /// Ticks until `stop_requested` returns true and every pressure has been commanded to zero.
+  /// Neither allocates nor throws as long as the callbacks do not.
   void run(const std::function<bool()>& stop_requested,
            const std::function<void(const Report&)>& after_tick);
 
+  /// Durations and counters so far.
   const LoopTiming& timing() const noexcept { return timing_; }
+  /// The pipeline after its latest tick.
   const ControlPipeline& pipeline() const noexcept { return pipeline_; }
+  /// Counters of messages.
   const DaemonLink& link() const noexcept { return link_; }
 
  private:

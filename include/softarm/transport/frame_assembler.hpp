@@ -1,4 +1,4 @@
-// Bodies that arrive one by one, each on a channel of its own -> frames.
+// Assembles frames from bodies that arrive one by one, each on a separate channel.
 #pragma once
 
 #include <array>
@@ -8,35 +8,36 @@
 
 namespace softarm {
 
-/// The rule: bodies whose stamps lie less than half a frame period from that of the first one
-/// belong to one frame. The frame is done when all bodies are there; or when one of a later frame
-/// arrives, or half a frame period has passed since the first arrived: then what is missing counts
-/// as not seen. What arrives for a frame that is done already is dropped, and so is what is older;
-/// twice as many old ones in a row as there are bodies are a clock that was set back, and a new
-/// beginning. Frames are numbered from 1, for their sender does not. Allocates nothing.
+/// Bodies whose stamps are less than half a frame period from that of the first one belong to one
+/// frame. A frame is complete when all bodies have arrived; it is also closed when a body of a
+/// later frame arrives, or half a frame period after its first body arrived: missing bodies then
+/// count as not seen. Bodies of a closed or older frame are dropped. Twice as many older bodies
+/// in a row as a frame has mean that the sender's clock was set back: assembly then starts again.
+/// Frames are numbered from 1, because the sender does not number them. Allocates nothing.
 class FrameAssembler {
  public:
-  /// A body waits with the frame under way, has begun one, or was dropped.
+  /// What `add` did with a body: it joined the current frame, began a new one, or was dropped.
   enum class Outcome { waiting, begun, dropped };
 
-  /// @param segments their ends are bodies 1 .. segments; body 0 is the base
-  /// @param fixed_base is waited for by nobody
-  /// @param frame_period_s above 0
+  /// @param segments  number n of segments: their ends are bodies 1 .. n, the base is body 0
+  /// @param fixed_base  the base is fixed: no message of body 0 is expected
+  /// @param frame_period_s  above 0
   FrameAssembler(int segments, bool fixed_base, double frame_period_s) noexcept;
 
-  /// One body. `waiting`: it joined the frame under way; `begun`: it is the first of its frame;
-  /// `dropped`. Frames that are done then wait in `take_done`.
+  /// Takes one body. A frame that this closes is then available from `take_done`.
+  /// @param stamp_us  time stamp of the sender  @param arrival_ns  on our monotonic clock
   Outcome add(std::size_t body, const BodyPose& pose, std::int64_t stamp_us,
               std::int64_t arrival_ns) noexcept;
 
-  /// Capture time of the frame under way; to be called after `begun`, before `take_done`.
+  /// Sets the capture time of the current frame; call after `begun`, before `take_done`.
   void set_capture_ns(std::int64_t capture_ns) noexcept;
 
-  /// Moves bodies, number and capture time of the frame that is done to `frame`; what is not its to
-  /// tell (a fixed base) is left alone. False if none is.
+  /// Moves bodies, number and capture time of the closed frame to `frame`; a fixed base is left
+  /// unchanged. False if no frame is closed.
   bool take_done(MocapFrame& frame) noexcept;
 
-  /// Declares the frame under way done where its first body arrived long enough before `now_ns`.
+  /// Closes the current frame if its first body arrived at least half a frame period before
+  /// `now_ns`.
   void look_at_clock(std::int64_t now_ns) noexcept;
 
  private:
@@ -61,7 +62,7 @@ class FrameAssembler {
   std::size_t bodies_;  // base included
   std::size_t first_;   // 1 where the base is fixed
   std::int64_t half_period_ns_;
-  Frame current_;  // under way, or the last one
+  Frame current_;  // being assembled, or the last one
   Frame done_;
   bool begun_ = false;
   bool under_way_ = false;

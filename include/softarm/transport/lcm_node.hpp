@@ -1,4 +1,4 @@
-// One LCM handle: subscribe, drain without waiting, publish from a buffer of our own.
+// One LCM handle: subscribe, drain without waiting, publish from a preallocated buffer.
 #pragma once
 
 #include <cstddef>
@@ -17,24 +17,26 @@ struct _lcm_recv_buf_t;
 
 namespace softarm {
 
-/// LCM could not be started or used; the message tells the cure.
+/// LCM could not be started or used; the message gives the fix.
 class TransportError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// A received packet; valid only during the handler.
+/// A received packet; valid only during the call of the handler.
 struct ReceivedMessage {
   std::span<const std::byte> bytes;
-  std::int64_t arrival_ns;  ///< at this machine, CLOCK_MONOTONIC; does not decrease (ArrivalClock)
+  std::int64_t arrival_ns;  ///< CLOCK_MONOTONIC of this machine; does not decrease (ArrivalClock)
+  std::int64_t stamp_us;    ///< the arrival as LCM stamped it, on the wall clock
 };
 
-/// Belongs to one thread. The C interface of LCM serves underneath, because the C++ one allocates
-/// for every message.
+/// An LCM handle for one thread. It uses the C interface of LCM, because the C++ interface
+/// allocates for every message.
 class LcmNode {
  public:
+  /// Called with every message of a channel; must not throw.
   using Handler = std::function<void(const ReceivedMessage&)>;
-  static constexpr int kLargestMessage =
-      60'000;  ///< bytes: the largest UDP payload, less LCM's header
+  /// Bytes: the largest UDP payload less LCM's header.
+  static constexpr int kLargestMessage = 60'000;
 
   /// @throws TransportError if LCM refuses the URL or no multicast route exists
   explicit LcmNode(const std::string& url);
@@ -42,27 +44,26 @@ class LcmNode {
   LcmNode(const LcmNode&) = delete;
   LcmNode& operator=(const LcmNode&) = delete;
 
-  /// Handlers must not throw. A full queue drops the newest messages, so `capacity` must cover what
-  /// can arrive between two drains. @throws TransportError
+  /// Subscribes to one channel by its literal name. A full queue drops the newest messages, so
+  /// `capacity` must cover what can arrive between two drains. @throws TransportError
   void subscribe(const std::string& channel, int capacity, Handler handler);
 
-  /// Handles what has arrived, at most `limit` messages, without waiting. Returns how many were
-  /// handled.
+  /// Handles the messages that have arrived, at most `limit`, without waiting. Returns how many.
   int drain(int limit) noexcept;
 
   /// Waits for a message until `deadline_ns` of CLOCK_MONOTONIC and handles it. Returns whether
-  /// there was one; false also when a signal cut the wait short.
+  /// there was one; also false if a signal interrupted the wait.
   bool wait_until(std::int64_t deadline_ns) noexcept;
 
-  /// Encodes into this node's buffer and publishes; false if it did not fit or was refused.
-  /// Allocates nothing.
+  /// Encodes into the buffer of this node and publishes; false if the message did not fit or LCM
+  /// refused it. Allocates nothing.
   template <class Message>
   bool publish(const std::string& channel, const Message& message) noexcept {
     const int size = message.encode(buffer_.data(), 0, static_cast<int>(buffer_.size()));
     return size >= 0 && send(channel.c_str(), size);
   }
 
-  /// Publishes what is encoded already; false if it is nothing, or was refused. Allocates nothing.
+  /// Publishes an encoded message; false if it is empty or LCM refused it. Allocates nothing.
   bool publish_encoded(const std::string& channel, std::span<const std::byte> bytes) noexcept;
 
  private:
@@ -81,8 +82,8 @@ class LcmNode {
   std::vector<std::byte> buffer_;
 };
 
-/// What instances on an LCM channel lock: neither the options behind the '?' of a URL nor another
-/// spelling of group and port make another network.
+/// The InstanceLock name of a channel. Neither the options after the '?' of a URL nor another
+/// spelling of group and port make it a different network.
 std::string lock_name(const std::string& channel, const std::string& url);
 
 }  // namespace softarm

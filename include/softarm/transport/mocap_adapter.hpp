@@ -1,23 +1,19 @@
-// Motion-capture messages <-> the frame the core works on.
+// Motion capture as sent <-> the frame that the core works on.
 #pragma once
 
 #include <cstdint>
-#include <softarm_messages/mocap_frame_t.hpp>
-#include <softarm_messages/optitrack_frame_t.hpp>
-#include <softarm_messages/rigid_transform_t.hpp>
 #include <vector>
 
 #include "softarm/estimation/mocap_frame.hpp"
 #include "softarm/model/arm.hpp"
-#include "softarm/transport/optitrack_frame.hpp"
+#include "softarm/transport/mocap_format.hpp"
+#include "softarm/transport/pose_convention.hpp"
 #include "softarm/transport/settings.hpp"
 
 namespace softarm {
 
-/// Picks the base and the segment ends out of whatever bodies a frame carries, and tells where
-/// their frames S_i are: with the position p and orientation R that were sent, A the rotation
-/// mocap.axes, s the unit, and the plate's t and E,
-///   R_world = A R E,  p_world = s A p + A R t.
+/// Picks the base and the segment ends out of whatever bodies a frame carries, and brings them to
+/// our world by their PoseConvention (mocap.unit, mocap.axes, and the poses of S_i on the bodies).
 /// A body that is absent counts as not seen. What is left at its default changes no bit.
 class MocapAdapter {
  public:
@@ -25,48 +21,22 @@ class MocapAdapter {
   MocapAdapter(const BodySettings& bodies, const ArmParameters& arm,
                const MocapSourceSettings& mocap = {});
 
-  /// Everything but `capture_ns`, which only a clock relation can tell. Allocates nothing.
-  void to_frame(const softarm_messages::mocap_frame_t& message, MocapFrame& frame) const noexcept;
-  void to_frame(const OptitrackFrame& message, MocapFrame& frame) const noexcept;
-
+  /// Everything but `capture_ns`, which only a clock relation can find. Allocates nothing.
+  void to_frame(const SentFrame& sent, MocapFrame& frame) const noexcept;
   /// Body 0 is the base, body i the end of segment i.
-  BodyPose to_pose(const softarm_messages::rigid_transform_t& message,
-                   std::size_t body) const noexcept;
+  BodyPose to_pose(const SentBody& sent, std::size_t body) const noexcept;
 
   /// A frame in which nothing is seen but a fixed base.
   void clear(MocapFrame& frame) const noexcept;
 
-  /// The message that `to_frame` turns back into this frame (optitrack_frame_t: rounded to floats).
-  /// Allocates only when the message grows.
-  void to_message(const MocapFrame& frame, std::int64_t sender_time_us,
-                  softarm_messages::mocap_frame_t& message) const;
-  void to_message(const MocapFrame& frame, std::int64_t sender_time_us,
-                  softarm_messages::optitrack_frame_t& message) const;
-  /// One body, which is seen.
-  void to_message(const BodyPose& pose, std::size_t body, std::int64_t sender_time_us,
-                  softarm_messages::rigid_transform_t& message) const noexcept;
+  /// The other way round; a fixed base is not sent.
+  void to_sent(const MocapFrame& frame, std::int64_t sender_time_us,
+               SentFrame& sent) const noexcept;
+  SentBody to_sent(const BodyPose& pose, std::size_t body) const noexcept;
 
   bool base_is_fixed() const noexcept { return bodies_.base_id < 0; }
 
  private:
-  struct Plate {
-    bool given = false;
-    Eigen::Vector3d position_m = Eigen::Vector3d::Zero();
-    Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();
-  };
-  /// In the sender's unit, in the order w, x, y, z.
-  struct Sent {
-    Eigen::Vector3d position;
-    Eigen::Quaterniond orientation;
-  };
-
-  template <class Number>
-  BodyPose seen(const Number* position, const Number* orientation, std::size_t body) const noexcept;
-  Sent sent(const BodyPose& pose, std::size_t body) const noexcept;
-  template <class Number>
-  void write(const Sent& sent, Number* position, Number* orientation) const noexcept;
-  template <class Bodies, class Read>
-  void pick(const Bodies& bodies, const Read& read, MocapFrame& frame) const noexcept;
   int id(std::size_t body) const noexcept {
     return body == 0 ? bodies_.base_id : bodies_.segment_ids[body - 1];
   }
@@ -74,11 +44,7 @@ class MocapAdapter {
   BodySettings bodies_;
   BodyPose fixed_base_;
   bool xyzw_;
-  double unit_m_;
-  bool turned_;
-  Eigen::Quaterniond axes_;
-  Eigen::Matrix3d axes_matrix_;
-  std::vector<Plate> plate_;  // of the base, then of the segments' ends
+  std::vector<PoseConvention> convention_;  // of the base, then of the segments' ends
 };
 
 }  // namespace softarm

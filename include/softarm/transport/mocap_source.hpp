@@ -55,8 +55,7 @@ class MocapSource {
   std::int64_t sender_time_us() const noexcept { return sender_time_us_; }
 
  private:
-  MocapReceipt take_body(std::size_t channel, std::span<const std::byte> bytes,
-                         std::int64_t arrival_ns, MocapFrame& frame) noexcept;
+  MocapReceipt take_body(std::size_t channel, std::int64_t arrival_ns, MocapFrame& frame) noexcept;
 
   MocapSourceKind kind_;
   MocapAdapter adapter_;
@@ -64,8 +63,8 @@ class MocapSource {
   std::vector<std::string> channels_;
   FrameAssembler assembler_;
   std::int64_t sender_time_us_ = 0;
-  softarm_messages::mocap_frame_t message_;
-  std::unique_ptr<OptitrackFrame> optitrack_;
+  std::unique_ptr<MocapFormat> format_;
+  std::unique_ptr<SentFrame> sent_;
 };
 
 /// Publishes frames in the configured source's messages.
@@ -80,8 +79,8 @@ class MocapSender {
   MocapSourceKind kind_;
   MocapAdapter adapter_;
   std::vector<std::string> channels_;
-  softarm_messages::mocap_frame_t message_;
-  softarm_messages::optitrack_frame_t optitrack_;
+  std::unique_ptr<MocapFormat> format_;
+  std::unique_ptr<SentFrame> sent_;
 };
 
 }  // namespace softarm

@@ -1,4 +1,4 @@
-// What a tick says on the wire: the same in the daemon and in its replay.
+// The messages of a tick: the same in the daemon and in its replay.
 #pragma once
 
 #include <cstdint>
@@ -12,7 +12,7 @@
 
 namespace softarm {
 
-/// Who is speaking: told in every status message, and in the records of ticks.
+/// Origin of the messages: sent in every status message and in the records of ticks.
 struct Provenance {
   std::string version;  ///< release and commit
   std::uint64_t configuration_hash = 0;
@@ -20,21 +20,23 @@ struct Provenance {
   std::string build;  ///< version, commit, compiler and instruction sets
 };
 
-/// As the status counts: up to 2^31 - 1, and no further.
+/// A count saturated at 2^31 - 1, as in the status message.
 std::int32_t counter(std::int64_t value) noexcept;
 
-/// Command and status of one tick. After construction nothing here allocates.
+/// Command and status messages of one tick. After construction nothing allocates.
 class OutputMessages {
  public:
+  /// Sizes all lists for the arm of `settings`. @param shadow  mark commands and statuses as such
   OutputMessages(const PipelineSettings& settings, const Provenance& provenance, bool shadow);
 
-  /// Pressures, or torques where these actuate; `time_us` is for the sender to fill.
+  /// Fills the command: pressures, or torques where actuation is by torque. The sender fills
+  /// `time_us`.
   void set_command(std::int64_t tick, const TickOutput& output) noexcept;
-  /// Everything but `time_us`, `overruns` and `messages_malformed`, which no pipeline knows. The
-  /// command of the same tick must have been set.
+  /// Fills the status except `time_us`, `overruns` and `messages_malformed`, which the pipeline
+  /// does not know. The command of the same tick must have been set.
   void set_status(std::int64_t tick, const ControlPipeline& pipeline) noexcept;
 
-  /// Commands are torques: another type, which no valve terminal decodes.
+  /// Whether commands are torques: another type, which no valve terminal decodes.
   bool by_torque() const noexcept { return by_torque_; }
 
   softarm_messages::pressure_command_t pressure_command;

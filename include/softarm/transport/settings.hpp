@@ -1,5 +1,5 @@
-// What an experiment may choose about the wire: LCM's network and channels, and what motion-capture
-// messages mean.
+// Settings of the transport: LCM's network and channels, and the meaning of motion-capture
+// messages. config/template.yaml documents every setting.
 #pragma once
 
 #include <Eigen/Core>
@@ -7,10 +7,11 @@
 #include <vector>
 
 #include "softarm/estimation/clock_relation.hpp"
+#include "softarm/transport/mocap_format.hpp"
 
 namespace softarm {
 
-/// LCM provider and channels; distinct where two arms share a machine.
+/// LCM provider and channels; two arms on one machine need different ones.
 struct LcmSettings {
   std::string url = "udpm://239.255.76.67:7667?ttl=0";
   std::string mocap_channel = "SOFTARM_MOCAP";
@@ -20,53 +21,48 @@ struct LcmSettings {
   std::string operator_channel = "SOFTARM_OPERATOR";
   std::string status_channel = "SOFTARM_STATUS";
   std::string timing_channel = "SOFTARM_TIMING";
-  std::string tick_channel = "SOFTARM_TICK";  ///< records for replay; empty: none
+  std::string tick_channel = "SOFTARM_TICK";
   std::string valves_channel = "SOFTARM_VALVES";
-  std::string plant_channel = "SOFTARM_PLANT";  ///< a simulated arm's true state, for reports
-  std::string deadman_channel;                  ///< of a dead-man input; empty: there is none
+  std::string plant_channel = "SOFTARM_PLANT";
+  std::string deadman_channel;
 };
 
-/// Who sends frames, and in which messages.
-enum class MocapSourceKind {
-  softarm,         ///< mocap_frame_t
-  optitrack,       ///< optitrack_frame_t
-  rigid_transform  ///< rigid_transform_t, one channel a body: lcm.mocap_channel, _, its name
-};
-/// In which order the four numbers of a quaternion are sent.
-enum class QuaternionOrder { xyzw, wxyz };
 /// Of positions as they are sent.
 enum class LengthUnit { metre, millimetre };
 
-/// What a frame's numbers mean.
+/// Meaning of the numbers in a frame.
 struct MocapSourceSettings {
-  MocapSourceKind source = MocapSourceKind::softarm;
+  MocapSourceKind source = softarm_mocap();
   LengthUnit unit = LengthUnit::metre;
   QuaternionOrder quaternion = QuaternionOrder::wxyz;
   /// p_world = axes * p_sent: from the sender's world to ours, whose z axis points up.
   Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();
 };
 
-/// A marker plate: where on it the frame S_i sits that the arm is made of.
-struct PlateSettings {
-  std::string name;  ///< of the body, where bodies have names instead of ids
-  Eigen::Vector3d position_m = Eigen::Vector3d::Zero();  ///< of S_i in the body's own frame
-  /// Rotation vector of S_i in the body's own frame: R_world_S = R_world_body exp(rotation^).
+/// A marker frame: the pose of the segment frame S_i in the frame of the rigid body that is
+/// tracked.
+struct MarkerFrameSettings {
+  std::string name;
+  Eigen::Vector3d position_m = Eigen::Vector3d::Zero();
+  /// Rotation vector of S_i in the body's frame: R_world_S = R_world_body exp(rotation^).
   Eigen::Vector3d rotation_rad = Eigen::Vector3d::Zero();
 
-  bool operator==(const PlateSettings&) const = default;
+  /// Equal in every field.
+  bool operator==(const MarkerFrameSettings&) const = default;
 };
 
-/// The channel of a body that has one of its own.
-inline std::string body_channel(const LcmSettings& lcm, const PlateSettings& plate) {
+/// The channel of a body where every body has a separate one (MocapSourceKind::rigid_transform).
+inline std::string body_channel(const LcmSettings& lcm, const MarkerFrameSettings& plate) {
   return lcm.mocap_channel + "_" + plate.name;
 }
 
 /// Which bodies of the motion-capture frame carry the base and the segment ends.
 struct BodySettings {
-  int base_id = 0;                                 ///< -1: the base is fixed by arm.base
-  std::vector<int> segment_ids;                    ///< n ids, from the base to the tip
-  PlateSettings base_plate = {};                   ///< not looked at where the base is fixed
-  std::vector<PlateSettings> segment_plates = {};  ///< n, or none: S_i are the bodies' own frames
+  int base_id = 0;                      ///< -1: the base is fixed by arm.base
+  std::vector<int> segment_ids;         ///< n ids, from the base to the tip
+  MarkerFrameSettings base_plate = {};  ///< unused where the base is fixed
+  std::vector<MarkerFrameSettings> segment_plates =
+      {};  ///< n, or none: S_i are then the body frames
 };
 
 /// Connections of softarmd.
@@ -74,8 +70,8 @@ struct TransportSettings {
   LcmSettings lcm;
   MocapSourceSettings mocap;
   BodySettings bodies;
-  /// How a frame's capture time is brought to our monotonic clock; safety.frame_latency_s is the
-  /// declared latency of either way.
+  /// How the capture time of a frame is converted to our monotonic clock; safety.frame_latency_s is
+  /// the declared latency in both modes.
   ClockMode capture_time = ClockMode::sender;
 };
 

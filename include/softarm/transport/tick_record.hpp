@@ -1,4 +1,4 @@
-// A tick on the wire: everything the pipeline was given, so that it can be given again.
+// The record of a tick: all inputs of the pipeline, so that the tick can be replayed.
 #pragma once
 
 #include <cstddef>
@@ -14,18 +14,18 @@
 
 namespace softarm {
 
-/// Writes every field of `input` into the record. Allocates nothing where the record's lists have
-/// the length (or the capacity) already.
+/// Writes every field of `input` into the record. Allocates nothing if the record's lists are long
+/// enough already (in size or capacity).
 void to_record(const TickInput& input, softarm_messages::tick_record_t& record);
 
 /// Whether an encoded record ends with the digest of what precedes it.
 bool is_intact(std::span<const std::byte> encoded) noexcept;
 
-/// A TickInput and what it points to.
+/// A TickInput restored from a record, with the data it points to.
 class RecordedInput {
  public:
-  /// What to_record was given, bit for bit; valid until the next call. The record must have come
-  /// through decode().
+  /// The input that to_record was given, bit for bit; valid until the next call. The record must
+  /// have been checked by decode().
   const TickInput& from(const softarm_messages::tick_record_t& record);
 
  private:
@@ -35,27 +35,29 @@ class RecordedInput {
   PressureVector measured_bar_;
 };
 
-/// Encodes the records of consecutive ticks and keeps each to be sent once more kRepeatAfter ticks
-/// later: a logger that was kept from its work for a moment loses what arrives just then, and
-/// without its record a tick cannot be replayed. After construction nothing here allocates.
+/// Encodes the records of consecutive ticks and keeps each to be sent again kRepeatAfter ticks
+/// later: a logger that is held up for a moment loses what arrives just then, and without its
+/// record a tick cannot be replayed. After construction nothing allocates.
 class TickRecorder {
  public:
-  static constexpr int kRepeatAfter = 50;
-  static constexpr int kMostFrames = 64;  ///< in a tick
+  static constexpr int kRepeatAfter = 50;  ///< ticks
+  static constexpr int kMostFrames = 64;   ///< in a tick
 
+  /// Allocates for the largest record of the arm of `settings`. @param shadow  mark records as such
   TickRecorder(const PipelineSettings& settings, const Provenance& provenance, bool shadow);
 
-  /// Encoded record of a tick; valid until the next call. Before it, where full(), the oldest is to
-  /// be taken. Ticks count from 1. Empty if it did not fit.
+  /// Encoded record of a tick; valid until the next call. If full(), call take_oldest() first.
+  /// Ticks are counted from 1. Empty if the record did not fit.
   std::span<const std::byte> record(std::int64_t tick, const TickInput& input,
                                     const PressureVector& command) noexcept;
 
-  /// kRepeatAfter records are kept.
+  /// Whether kRepeatAfter records are kept.
   bool full() const noexcept { return kept_ == kRepeatAfter; }
-  /// Takes the oldest of the records kept; valid until the next call of record(). Empty if none is.
+  /// Removes and returns the oldest record kept; valid until the next call of record(). Empty if
+  /// there is none.
   std::span<const std::byte> take_oldest() noexcept;
 
-  /// As many frames fit into a record of this arm: 1 to kMostFrames.
+  /// How many frames fit into a record of this arm: 1 to kMostFrames.
   int frame_capacity() const noexcept { return static_cast<int>(record_.frames.size()); }
 
  private:

@@ -13,25 +13,26 @@
 
 namespace softarm {
 
-/// Belongs to the driver's thread. After construction nothing allocates or throws.
+/// Passes commands to the driver and publishes its measurements and status. Use from the driver's
+/// thread. After construction nothing allocates or throws.
 class ValvesLink {
  public:
   /// Commands go to `driver`, which must outlive this. @throws TransportError
   ValvesLink(const LcmSettings& lcm, ValveDriver& driver);
 
-  /// Takes commands as they come until `deadline_ns` of CLOCK_MONOTONIC, so that their validity
+  /// Takes commands as they arrive until `deadline_ns` of CLOCK_MONOTONIC, so that their validity
   /// counts from their arrival.
   void take_until(std::int64_t deadline_ns) noexcept;
-  /// Empties the queue of commands: takes them, or throws them away.
+  /// Empties the queue of commands: takes or discards them.
   void drain(bool take) noexcept;
 
-  /// The pressures that the driver has just read back.
+  /// Publishes the pressures that the driver has just read back.
   void publish_measurement(std::int64_t now_ns) noexcept;
-  /// State and counters where state, reason or chamber have changed, and ten times a second. True
-  /// after a change.
+  /// Publishes state and counters when state, reason or chamber have changed, and ten times a
+  /// second. Returns whether they have changed.
   bool publish_status(std::int64_t now_ns, std::int64_t late_cycles) noexcept;
 
-  /// Commands that were malformed, or of another arm.
+  /// Commands that were malformed or for another arm.
   std::int64_t refused() const noexcept { return refused_; }
 
  private:

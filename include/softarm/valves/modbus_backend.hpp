@@ -1,4 +1,4 @@
-// A valve terminal on Modbus TCP as a back end: pressures to words and requests, and back.
+// A valve terminal on Modbus TCP as a back end: converts pressures to register words and back.
 #pragma once
 
 #include <array>
@@ -14,7 +14,7 @@ namespace softarm {
 /// One block write a cycle and one block read, by the register map of the settings.
 class ModbusBackend : public ValveBackend {
  public:
-  /// @throws std::invalid_argument for a host that is no IPv4 address
+  /// @throws std::invalid_argument for a host that is not an IPv4 address
   ModbusBackend(const ValveDriverSettings& settings, double max_pressure_bar);
 
   bool connect() noexcept override;
@@ -26,7 +26,7 @@ class ModbusBackend : public ValveBackend {
   const char* error() const noexcept override;
   /// "HOST:PORT unit ID"
   std::string address() const override;
-  /// That the registers were not tried on hardware, unless the terminal is on this machine.
+  /// Warns that the registers were not tested on hardware, unless the terminal is on this machine.
   std::string warning() const override;
 
  private:
@@ -34,7 +34,7 @@ class ModbusBackend : public ValveBackend {
   double max_pressure_bar_;
   ModbusTerminal terminal_;
   std::vector<std::uint16_t> out_, in_;
-  std::array<char, 200> refusal_{};  ///< of the time-out; "": the terminal's own error counts
+  std::array<char, 200> refusal_{};  ///< of the time-out; "": report the terminal's error
 };
 
 }  // namespace softarm

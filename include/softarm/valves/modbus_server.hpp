@@ -11,26 +11,27 @@ struct _modbus;
 namespace softarm {
 
 /// Serves functions 3 (read holding registers), 6 and 16 (write one, several) of a RegisterBank;
-/// anything else gets an exception reply. At most `kMaxClients` at a time, more are turned away. A
-/// client that sends half a request, or nonsense, is dropped. Belongs to one thread.
+/// anything else gets an exception reply. At most `kMaxClients` clients at a time, further ones are
+/// refused. A client that sends an incomplete or invalid request is disconnected. Belongs to one
+/// thread.
 class ModbusServer {
  public:
   static constexpr int kMaxClients = 4;
 
-  /// Listens on 127.0.0.1. @param port 0: any that is free @throws std::runtime_error if it cannot
+  /// Listens on 127.0.0.1. @param port 0: any free port @throws std::runtime_error if it cannot
   explicit ModbusServer(int port);
   ~ModbusServer();
   ModbusServer(const ModbusServer&) = delete;
   ModbusServer& operator=(const ModbusServer&) = delete;
 
+  /// The port it listens on.
   int port() const noexcept { return port_; }
-  int clients() const noexcept { return static_cast<int>(clients_.size()); }
 
-  /// Waits until a client wants something, or `deadline_ns` of CLOCK_MONOTONIC; says which. False
-  /// also when a signal cut the wait short.
+  /// Waits for a client until `deadline_ns` of CLOCK_MONOTONIC. Returns true if a client is waiting
+  /// to be served, false at the deadline or when a signal interrupted the wait.
   bool wait_until(std::int64_t deadline_ns) noexcept;
 
-  /// Answers what has arrived, one request a client.
+  /// Answers pending requests, one per client.
   void serve(RegisterBank& bank) noexcept;
 
  private:

@@ -1,5 +1,4 @@
-// The client's side of Modbus TCP, by libmodbus: requests that end in time, whatever the terminal
-// does.
+// Modbus TCP client on libmodbus: every request ends in bounded time, whatever the terminal does.
 #pragma once
 
 #include <cstdint>
@@ -18,15 +17,17 @@ namespace softarm {
 class ModbusTerminal {
  public:
   /// Uses host, port, unit_id and the time-outs. @throws std::invalid_argument for a host that is
-  /// no IPv4 address
+  /// not an IPv4 address
   explicit ModbusTerminal(const ValveDriverSettings& settings);
   ~ModbusTerminal();
   ModbusTerminal(const ModbusTerminal&) = delete;
   ModbusTerminal& operator=(const ModbusTerminal&) = delete;
 
-  /// Within `connect_timeout_s`; false: see `error`.
+  /// Connects within `connect_timeout_s`; false: see `error`.
   bool connect() noexcept;
+  /// Closes the connection, if it is open.
   void close() noexcept;
+  /// Whether `connect` succeeded and `close` was not called since.
   bool is_open() const noexcept { return open_; }
 
   /// Writes holding registers from `address` on.
@@ -34,7 +35,7 @@ class ModbusTerminal {
   /// Reads holding registers from `address` on; `words` is unspecified unless ok.
   LinkResult read(int address, std::span<std::uint16_t> words) noexcept;
 
-  /// Why the last call that failed did.
+  /// Reason of the last failure.
   const char* error() const noexcept;
 
  private:

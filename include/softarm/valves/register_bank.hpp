@@ -1,4 +1,4 @@
-// What stands behind a Modbus server: registers, and who may touch which.
+// Interface behind a Modbus server: registers, and which of them may be read or written.
 #pragma once
 
 #include <cstdint>
@@ -10,10 +10,14 @@ namespace softarm {
 class RegisterBank {
  public:
   virtual ~RegisterBank() = default;
+  /// All registers.
   virtual std::span<std::uint16_t, 65536> registers() noexcept = 0;
+  /// Whether `count` registers from `address` on may be read.
   virtual bool readable(int address, int count) const noexcept = 0;
+  /// Whether they may be written.
   virtual bool writable(int address, int count) const noexcept = 0;
-  /// After a request was served; `count` registers from `address` were written (0: it only read).
+  /// Called after a request was served; `count` registers from `address` were written (0: read
+  /// only).
   virtual void served(int address, int count) noexcept = 0;
 };
 

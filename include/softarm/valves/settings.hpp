@@ -1,5 +1,5 @@
-// What an experiment says about the valves: who drives them, where the terminal is, its registers,
-// what counts as a fault.
+// Settings of the valves: the back end, the address of the terminal, its registers, and what counts
+// as a fault. config/template.yaml documents every setting.
 #pragma once
 
 #include <array>
@@ -8,56 +8,57 @@
 
 namespace softarm {
 
-/// Terminals whose registers are known from documents; none of them was tried on hardware.
+/// Terminals whose registers are known from their manuals; none of them was tested on hardware.
 enum class TerminalKind { cpx_vppm, cpx_vtem, cpx_e, cpx_ap, free };
 inline constexpr std::array<const char*, 5> kTerminalNames = {"cpx_vppm", "cpx_vtem", "cpx_e",
                                                               "cpx_ap", "free"};
 
-/// Where a terminal keeps what. Addresses are those of the protocol (what libmodbus takes), from 0.
-/// Valves stand in slots, `valves_per_slot` in each, their words side by side; -1 means "none".
+/// Register layout of a terminal. Addresses are those of the protocol (as libmodbus takes them),
+/// from 0. Valves are grouped in slots, `valves_per_slot` in each, their words adjacent; -1 means
+/// "none".
 struct RegisterMap {
-  int write_address = 0;    ///< first word of the first slot
-  int write_words = 1;      ///< a slot
-  int set_point_word = 0;   ///< in the slot, of its first valve
-  int valves_per_slot = 1;  ///< how many set points stand side by side
-  int control_word = -1;    ///< in the slot
-  int control_value = 0;    ///< written there in every cycle: regulate pressure
-  int read_address = 0;     ///< first word of the first slot
-  int read_words = 1;       ///< a slot
-  int actual_word = 0;      ///< in the slot, measured pressure of its first valve
-  int echo_word = -1;       ///< the set points as the terminal has them
+  int write_address = 0;
+  int write_words = 1;
+  int set_point_word = 0;
+  int valves_per_slot = 1;
+  int control_word = -1;
+  int control_value = 0;
+  int read_address = 0;
+  int read_words = 1;
+  int actual_word = 0;
+  int echo_word = -1;
   int diagnosis_word = -1;
-  int diagnosis_mask = 0xffff;  ///< bits of the diagnosis that vent
+  int diagnosis_mask = 0xffff;
   int status_word = -1;
   int status_mask = 0xff;
-  int status_ready = 0;         ///< (status & mask) of a slot that regulates
-  double units_per_bar = 1000;  ///< set points and measured pressures count mbar
-  int timeout_address = -1;     ///< the terminal's own fail-safe time-out
-  int timeout_words = 1;        ///< 2: low word first
+  int status_ready = 0;  ///< (status & mask) of a slot that regulates
+  double units_per_bar = 1000;
+  int timeout_address = -1;
+  int timeout_words = 1;
   double timeout_unit_s = 1e-3;
-  double timeout_least_s = 0.0;  ///< the terminal takes no less
+  double timeout_least_s = 0.0;
 };
 
 /// Settings of softarm-valves.
 struct ValveDriverSettings {
-  std::string backend = "modbus";  ///< who drives the valves: a name of valve_backend_names()
-  std::string device;              ///< what a back end that is not on a network opens
-  std::string host = "127.0.0.1";  ///< IPv4 address
+  std::string backend = "modbus";  ///< one of valve_backend_names()
+  std::string device;              ///< opened by a back end that is not on a network
+  std::string host = "127.0.0.1";
   int port = 502;
   int unit_id = 1;
   TerminalKind terminal = TerminalKind::cpx_vppm;
   RegisterMap registers;
-  std::vector<int> order;             ///< the valve of every chamber, counted from 0
-  double rate_hz = 200.0;             ///< cycles: one block write, one block read
-  double response_timeout_s = 0.004;  ///< of one request, below one period
+  std::vector<int> order;  ///< the valve of every chamber, counted from 0
+  double rate_hz = 200.0;
+  double response_timeout_s = 0.004;
   double connect_timeout_s = 0.25;
-  int tolerated_failures = 2;  ///< cycles in a row without an answer before the link is given up
-  double backoff_s = 0.1;      ///< before the first attempt to connect again; doubles
+  int tolerated_failures = 2;
+  double backoff_s = 0.1;
   double longest_backoff_s = 5.0;
-  double failsafe_timeout_s = 0.2;  ///< set in the terminal, which vents when we fall silent
-  double stuck_bar = 0.3;           ///< a pressure further from its set point than this ...
-  double stuck_after_s = 1.0;       ///< ... for so long belongs to a stuck valve
-  bool stuck_vents = true;          ///< false: only reported
+  double failsafe_timeout_s = 0.2;
+  double stuck_bar = 0.3;
+  double stuck_after_s = 1.0;
+  bool stuck_vents = true;
 };
 
 }  // namespace softarm

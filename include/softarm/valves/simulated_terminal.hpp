@@ -1,4 +1,4 @@
-// A valve terminal's registers without its valves: what a driver writes and reads.
+// The registers of a valve terminal, without valves: what a driver writes and reads.
 #pragma once
 
 #include <Eigen/Core>
@@ -11,11 +11,12 @@
 
 namespace softarm {
 
-/// Behaves as the documents say, and as badly: a negative set point opens the valve wide. Set
-/// points reset to zero when the driver has been silent for the time-out that it set (0, as after
+/// Behaves as documented, including the hazards: a negative set point fully opens the valve. Set
+/// points reset to zero when no request arrives within the time-out set by the driver (0, as after
 /// power-up: never).
 class SimulatedTerminal : public RegisterBank {
  public:
+  /// `order`: the valve of every chamber, from 0.
   SimulatedTerminal(const RegisterMap& map, std::vector<int> order);
 
   std::span<std::uint16_t, 65536> registers() noexcept override {
@@ -25,15 +26,15 @@ class SimulatedTerminal : public RegisterBank {
   bool writable(int address, int count) const noexcept override;
   void served(int address, int count) noexcept override;
 
-  /// True once for any number of requests served since.
+  /// Whether any request was served since the last call.
   bool take_served() noexcept;
-  /// Sensors: one pressure a chamber, then what the terminal tells of itself.
+  /// Sets the sensors: one pressure per chamber (bar), then the status that the terminal reports.
   void measure(const Eigen::VectorXd& actual_bar) noexcept;
-  /// One set point a chamber as the valves take it (bar); slots that do not regulate give 0.
+  /// Set points as the valves take them (bar, one per chamber); slots that do not regulate give 0.
   const Eigen::VectorXd& set_points_bar() noexcept;
-  /// As the driver set it; 0: never.
+  /// Time-out as set by the driver; 0: never.
   double timeout_s() const noexcept;
-  /// What its time-out does.
+  /// Effect of the time-out: resets the set points.
   void reset_outputs() noexcept;
 
  private:

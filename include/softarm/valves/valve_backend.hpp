@@ -1,5 +1,4 @@
-// What the valve driver asks of valve hardware, and how it finds the hardware that an experiment
-// names.
+// Interface between the valve driver and valve hardware, and the registry of back ends by name.
 #pragma once
 
 #include <Eigen/Core>
@@ -16,13 +15,14 @@ namespace softarm {
 /// How a request to the hardware ended.
 enum class LinkResult {
   ok,
-  no_answer,        ///< too late, or none to what was asked
-  exception_reply,  ///< the hardware answers, and refuses
+  no_answer,        ///< none in time, or not to this request
+  exception_reply,  ///< the hardware refused the request
   broken            ///< the connection is lost
 };
 
 /// What the hardware reports about the valves of all chambers.
 struct ReadBack {
+  /// For `chambers` chambers, all pressures zero.
   explicit ReadBack(int chambers)
       : actual_bar(Eigen::VectorXd::Zero(chambers)),
         echo_bar(actual_bar),
@@ -36,42 +36,46 @@ struct ReadBack {
   bool ready = true;                     ///< every valve regulates its pressure
 };
 
-/// Valve hardware: set points out, measured pressures in. A back end moves numbers; what they may
-/// be, and what to do when something fails, is decided by ValveGuard.
+/// Valve hardware: set points out, measured pressures in. A back end only transfers numbers;
+/// ValveGuard decides which values are allowed and what to do on a failure.
 ///
 /// All calls come from one thread. They neither throw nor allocate, and they return within
-/// `response_timeout_s` (`connect`: `connect_timeout_s`), whatever the hardware does: who waits
-/// longer holds up the command that vents. Pressures have one entry per chamber, in the order of
-/// the command, in bar.
+/// `response_timeout_s` (`connect`: `connect_timeout_s`), whatever the hardware does: a longer wait
+/// would delay the command that vents. Pressures have one entry per chamber, in the order of the
+/// command, in bar.
 class ValveBackend {
  public:
   virtual ~ValveBackend() = default;
 
-  /// Opens the connection, anew if it is open. False: `error` has the reason.
+  /// Opens the connection, closing an open one first. False: `error` has the reason.
   virtual bool connect() noexcept = 0;
+  /// Closes the connection, if it is open.
   virtual void close() noexcept = 0;
+  /// Whether the connection is open.
   virtual bool is_open() const noexcept = 0;
 
+  /// Result of `secure`.
   struct Secured {
     LinkResult result;
     bool confirmed;  ///< the time-out reads back as it was set
   };
-  /// Sets the time after which the hardware vents by itself when it hears nothing
-  /// (`failsafe_timeout_s`), and reads it back. No pressure is written before it is confirmed: the
-  /// arm would keep it when the driver dies. Hardware without such a time-out cannot be driven.
+  /// Sets the time without requests after which the hardware vents by itself
+  /// (`failsafe_timeout_s`), and reads it back. No pressure is written before it is confirmed:
+  /// otherwise the arm would stay pressurised if the driver crashed. Hardware without such a
+  /// time-out cannot be driven.
   virtual Secured secure() noexcept = 0;
 
   /// @param set_points_bar each in [0, max_pressure_bar]
   virtual LinkResult write(const Eigen::VectorXd& set_points_bar) noexcept = 0;
-  /// Fills `read_back`, which is unspecified unless ok. What is not a finite number counts as no
+  /// Fills `read_back`, which is unspecified unless ok. A value that is not finite counts as no
   /// answer.
   virtual LinkResult read(ReadBack& read_back) noexcept = 0;
 
-  /// Why the last call that failed did; valid until the next call.
+  /// Reason of the last failure; valid until the next call.
   virtual const char* error() const noexcept = 0;
-  /// Where the hardware is, for people and for the lock that keeps a second driver away from it.
+  /// Address of the hardware, for messages and for the lock that excludes a second driver.
   virtual std::string address() const = 0;
-  /// What a user should know at the start; empty: nothing.
+  /// Warning to print at the start; empty: none.
   virtual std::string warning() const { return ""; }
 };
 
@@ -80,24 +84,29 @@ class ValveBackend {
 using ValveBackendFactory = std::function<std::unique_ptr<ValveBackend>(
     const ValveDriverSettings& settings, double max_pressure_bar)>;
 
-/// Adds a back end under the name that `valves.backend` may say. An object of static storage beside
-/// the class is the one line it takes:
+/// Adds a back end under a name that `valves.backend` of an experiment may have. Call it before the
+/// driver starts. @throws std::invalid_argument if the name is taken
+void add_valve_backend(const std::string& name, ValveBackendFactory make);
+
+/// Registers a back end class under a name, in one line beside the class:
 ///
-///   const softarm::ValveBackendRegistration kBoard("my_board", [](const auto& settings, double) {
-///     return std::make_unique<MyBoard>(settings);
-///   });
+///   const softarm::ValveBackendRegistration<MyBoard> kRegistration("my_board");
 ///
-/// @throws std::invalid_argument if the name is taken
-class ValveBackendRegistration {
- public:
-  ValveBackendRegistration(const std::string& name, ValveBackendFactory make);
+/// Its constructor has one parameter, const ValveDriverSettings&.
+template <class Backend>
+struct ValveBackendRegistration {
+  explicit ValveBackendRegistration(const std::string& name) {
+    add_valve_backend(name, [](const ValveDriverSettings& settings, double) {
+      return std::make_unique<Backend>(settings);
+    });
+  }
 };
 
-/// The names that are known in this program: "modbus" and those registered.
+/// The names known in this program: "modbus" and those registered.
 std::vector<std::string> valve_backend_names();
 
 /// The back end that `settings.backend` names.
-/// @throws std::invalid_argument as the factory does, or if there is none of that name
+/// @throws std::invalid_argument as the factory does, or if no back end has that name
 std::unique_ptr<ValveBackend> make_valve_backend(const ValveDriverSettings& settings,
                                                  double max_pressure_bar);
 

@@ -1,4 +1,4 @@
-// Commands to valves: the guard decides, a back end acts. Neither sockets of its own nor messages.
+// Commands to valves: the guard decides, a back end acts. No LCM here.
 #pragma once
 
 #include <Eigen/Core>
@@ -21,36 +21,41 @@ namespace softarm {
 /// allocates after construction, where the back end does not.
 class ValveDriver {
  public:
-  /// @param clock ns of the monotonic clock whose times are the arguments below; asked again where
-  /// a request may have taken long
+  /// @param clock ns of the monotonic clock whose times are the arguments below; read again where a
+  /// request may have taken long
   ValveDriver(const ValveGuardSettings& settings, std::unique_ptr<ValveBackend> backend,
               std::function<std::int64_t()> clock = monotonic_now_ns);
 
-  /// False: commands that wait in queues are too old and must be thrown away (ValveGuard::wake).
+  /// False: queued commands are too old and must be discarded (ValveGuard::wake).
   bool wake(std::int64_t now_ns) noexcept { return guard_.wake(now_ns); }
+  /// A command that arrived at `arrival_ns`, by the rules of CommandExpiry.
   CommandVerdict command(const PressureCommand& command, std::int64_t arrival_ns) noexcept {
     return guard_.command(command, arrival_ns);
   }
-  /// Does what the guard wants next. True if pressures were written and read back.
+  /// Carries out the guard's next action. True if pressures were written and read back.
   bool cycle(std::int64_t now_ns) noexcept;
 
-  /// From now on every set point is zero. To be called once.
+  /// From now on every set point is zero. Call it once.
   void stop(std::int64_t now_ns) noexcept;
+  /// Whether `stop` was called.
   bool stopping() const noexcept { return stopping_; }
-  /// After `stop`: zero was confirmed, or cannot be any more (within 0.7 s, or without a
-  /// connection).
+  /// After `stop`: zero was confirmed, or can no longer be confirmed (0.7 s have passed, or there
+  /// is no connection).
   bool stopped(std::int64_t now_ns) const noexcept;
+  /// Closes the connection to the hardware.
   void close() noexcept { backend_->close(); }
 
+  /// The guard, for its state and counters.
   const ValveGuard& guard() const noexcept { return guard_; }
-  /// Set points of the last write (bar, one per chamber), the command that was in force then, and
-  /// what was read back last.
+  /// Set points of the last write (bar, one per chamber).
   const Eigen::VectorXd& written_bar() const noexcept { return written_bar_; }
+  /// Sequence number of the command in force at the last write.
   std::int64_t written_sequence() const noexcept { return sequence_; }
+  /// Result of the last read.
   const ReadBack& read_back() const noexcept { return read_back_; }
 
-  /// State and reason in words, with what they are about: "DEGRADED (stuck valve): chamber 5 ...".
-  /// Written into `buffer`, cut to fit.
+  /// State and reason in words, with details: "DEGRADED (stuck valve): chamber 5 ...". Written into
+  /// `buffer`, cut to fit.
   std::string_view text(std::span<char> buffer) const noexcept;
 
  private:

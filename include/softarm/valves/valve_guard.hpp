@@ -1,5 +1,5 @@
-// What may be written to the valves, and when not to trust them: a state machine without sockets
-// or clocks.
+// Decides what may be written to the valves and when they are not to be trusted: a state machine
+// without sockets or clocks.
 #pragma once
 
 #include <Eigen/Core>
@@ -7,20 +7,22 @@
 #include <vector>
 
 #include "softarm/actuation/command_expiry.hpp"
+#include "softarm/base/time.hpp"
 #include "softarm/valves/settings.hpp"
 #include "softarm/valves/valve_backend.hpp"
 
 namespace softarm {
 
-/// Where the driver stands with its terminal, and what it writes.
+/// State of the connection to the terminal, and what is written in it.
 enum class ValveState : std::int8_t {
-  disconnected,  ///< the terminal vents by its own time-out; the next attempt waits its turn
+  disconnected,  ///< the terminal vents by its own time-out; the next attempt waits for the back-off
   securing,      ///< connected: that time-out is being set and read back; no pressure is written
   starting,      ///< set points of zero, until the terminal is ready and reads back well
   vented,        ///< set points of zero: no command is in force, or none may be
   running,       ///< the command in force is written
   degraded       ///< set points of zero: a fault was seen; left when all has been well for a while
 };
+/// Name in messages, in static storage.
 const char* name(ValveState state) noexcept;
 
 /// Why pressures are not what is commanded.
@@ -28,16 +30,17 @@ enum class ValveReason : std::int8_t {
   none,
   no_command,        ///< none came, or the last one expired
   no_connection,     ///< refused or lost
-  no_answer,         ///< too late or not to the question, too often in a row
+  no_answer,         ///< too late or not to the request, too often in a row
   exception_reply,   ///< the terminal refuses requests
   failsafe_refused,  ///< its time-out cannot be set, or reads back as something else
   not_ready,         ///< a slot does not regulate
   diagnosis,         ///< a valve reports a fault
   stuck_valve,       ///< a pressure does not follow its set point
-  time_gap,          ///< we were not running for a while
+  time_gap,          ///< the driver was not running for a while
   waiting_for_zero,  ///< until commands have been zero, or silent, once
   shutdown
 };
+/// Name in messages, in static storage; empty for none.
 const char* name(ValveReason reason) noexcept;
 
 /// What the driver does next.
@@ -48,17 +51,17 @@ enum class ValveAction {
   exchange  ///< write `set_points_bar`, read pressures back, then `exchanged`
 };
 
-/// What the guard has to know of the terminal and the arm.
+/// Configuration of the guard.
 struct ValveGuardSettings {
   ValveDriverSettings driver;
   int chambers = 1;  ///< >= 1
   double max_pressure_bar = 2.0;
   double rise_bar_per_s = 8.0;      ///< of set points on the way from vented to what is commanded
-  double longest_validity_s = 0.1;  ///< of a command, whatever it says of itself
+  double longest_validity_s = 0.1;  ///< upper limit of a command's own validity
   bool wait_for_zero = false;  ///< after DEGRADED (and at first) commands must have been zero once
 };
 
-/// What happened since the start of the driver.
+/// Counters since the start of the driver.
 struct ValveCounters {
   std::int64_t cycles = 0;  ///< exchanges that went well
   std::int64_t connections = 0;
@@ -69,15 +72,16 @@ struct ValveCounters {
 };
 
 /// Time is an argument (ns of a monotonic clock that never goes back). Once a cycle: `wake`, the
-/// commands that came, `next`, `wake` once more before an exchange, and what came of the action.
+/// commands that came, `next`, `wake` once more before an exchange, and the result of the action.
 /// Never throws or allocates after construction.
 class ValveGuard {
  public:
+  /// Starts disconnected.
   explicit ValveGuard(const ValveGuardSettings& settings);
 
-  /// At the start of a cycle, and right before pressures are written: what was decided before a gap
-  /// in time is not for a terminal that may have vented meanwhile. False after a gap: everything
-  /// that waits in queues is too old and must be thrown away.
+  /// At the start of a cycle, and right before pressures are written: a decision made before a gap
+  /// in time does not apply to a terminal that may have vented meanwhile. False after a gap:
+  /// everything in queues is too old and must be discarded.
   bool wake(std::int64_t now_ns) noexcept;
 
   /// By the rules of CommandExpiry.
@@ -85,7 +89,9 @@ class ValveGuard {
     return expiry_.receive(command, arrival_ns);
   }
 
+  /// The action to take now; report its result by `connected`, `secured` or `exchanged`.
   ValveAction next(std::int64_t now_ns) noexcept;
+  /// Result of connecting; after a failure the next attempt waits for the back-off time.
   void connected(bool success, std::int64_t now_ns) noexcept;
   /// @param as_written the time-out read back equals the one that was set.
   void secured(LinkResult result, bool as_written, std::int64_t now_ns) noexcept;
@@ -98,21 +104,22 @@ class ValveGuard {
   /// points can be read back), or nothing else was ever written.
   bool zero_confirmed() const noexcept { return zero_confirmed_; }
 
+  /// State after the latest call.
   ValveState state() const noexcept { return state_; }
+  /// Reason of the state.
   ValveReason reason() const noexcept { return reason_; }
-  /// The chamber that DEGRADED, or a report of a stuck valve, is about; -1: none.
+  /// The chamber that DEGRADED, or a report of a stuck valve, refers to; -1: none.
   int chamber() const noexcept { return chamber_; }
-  /// Of the command whose set points are written, CommandExpiry::kNoSequence where none is.
+  /// Sequence number of the command whose set points are written; CommandExpiry::kNoSequence: none.
   std::int64_t sequence() const noexcept {
     return state_ == ValveState::running ? expiry_.sequence() : CommandExpiry::kNoSequence;
   }
-  /// What is to be written (one a chamber), within [0, max_pressure_bar]; zero unless running.
+  /// Set points to write (bar, one per chamber), within [0, max_pressure_bar]; zero unless running.
   const Eigen::VectorXd& set_points_bar() const noexcept { return set_points_bar_; }
+  /// Counters since construction.
   const ValveCounters& counters() const noexcept { return counters_; }
 
  private:
-  static constexpr std::int64_t kLongAgo = INT64_MIN;
-
   void enter(ValveState state, ValveReason reason) noexcept;
   void disconnect(ValveReason reason, std::int64_t now_ns) noexcept;
   void degrade(ValveReason reason, int chamber) noexcept;
@@ -133,21 +140,22 @@ class ValveGuard {
   ValveState state_ = ValveState::disconnected;
   ValveReason reason_ = ValveReason::no_connection;
   int chamber_ = -1;
-  std::int64_t woken_ns_ = kLongAgo;
-  std::int64_t next_attempt_ns_ = kLongAgo;
+  std::int64_t woken_ns_ = kNever;
+  std::int64_t next_attempt_ns_ = kNever;
   std::int64_t backoff_ns_;
-  std::int64_t since_ns_ = 0;  ///< when starting began, or the first of `failures_` happened
-  std::int64_t written_ns_ = kLongAgo;
-  std::int64_t listening_since_ns_ = kLongAgo;  ///< for commands of zero, or none
-  std::int64_t answered_ns_ = 0;                ///< the cycle of the newest exchange that went well
-  int failures_ = 0;                            ///< in a row
-  int good_cycles_ = 0;                         ///< in a row
+  std::int64_t starting_since_ns_ = 0;
+  std::int64_t failing_since_ns_ = 0;  ///< the first of `failures_`
+  std::int64_t written_ns_ = kNever;
+  std::int64_t listening_since_ns_ = kNever;  ///< for commands of zero, or none
+  std::int64_t answered_ns_ = 0;              ///< the cycle of the newest exchange that went well
+  int failures_ = 0;                          ///< in a row
+  int good_cycles_ = 0;                       ///< in a row
   bool must_see_zero_;
   bool rising_ = true;  ///< on the way from vented to what is commanded
   bool stopping_ = false;
   bool zero_confirmed_ = true;
   Eigen::VectorXd set_points_bar_;
-  std::vector<std::int64_t> off_since_ns_;  ///< kLongAgo while a chamber follows its set point
+  std::vector<std::int64_t> off_since_ns_;  ///< kNever while a chamber follows its set point
   ValveCounters counters_;
 };
 

@@ -1,195 +1,23 @@
 // softarm-plant: the simulated arm in real time. Valve pressures in, motion-capture frames and
-// measured pressures out, in the messages the hardware speaks; with --modbus behind a valve
-// terminal's registers.
+// measured pressures out, in the messages of the hardware; with --modbus behind the registers of a
+// valve terminal.
 #include <fmt/format.h>
 
-#include <cmath>
-#include <memory>
 #include <optional>
-#include <utility>
-#include <vector>
+#include <string>
 
 #include "apps/program.hpp"
 #include "apps/signals.hpp"
-#include "softarm/base/clock.hpp"
+#include "apps/softarm-plant/plant_process.hpp"
 #include "softarm/base/instance_lock.hpp"
+#include "softarm/base/time.hpp"
 #include "softarm/base/version.hpp"
 #include "softarm/config/load.hpp"
-#include "softarm/simulation/simulated_arm.hpp"
 #include "softarm/transport/lcm_node.hpp"
-#include "softarm/transport/message_decoding.hpp"
-#include "softarm/transport/mocap_source.hpp"
 #include "softarm/transport/settings.hpp"
-#include "softarm/valves/modbus_server.hpp"
-#include "softarm/valves/simulated_terminal.hpp"
 
 namespace softarm {
 namespace {
-
-/// A valve terminal in front of the arm, polled by the plant's own loop.
-struct ModbusSide {
-  ModbusSide(const ValveDriverSettings& valves, int port)
-      : server(port), terminal(valves.registers, valves.order) {}
-
-  ModbusServer server;
-  SimulatedTerminal terminal;
-  std::int64_t sequence = 0;
-};
-
-class PlantProcess {
- public:
-  PlantProcess(const Experiment& experiment, std::optional<int> modbus_port)
-      : lcm_(experiment.transport.lcm),
-        mocap_(experiment.transport, experiment.plant.arm),
-        node_(lcm_.url),
-        // Registers hold until the terminal's own time-out, and for ever without one.
-        arm_(experiment.plant, monotonic_now_ns(),
-             modbus_port ? CommandExpiry::kNever
-                         : std::llround(1e9 * experiment.safety.command_validity_s)),
-        by_torque_(experiment.plant.actuation.kind == ActuationKind::torque),
-        report_period_ns_(static_cast<std::int64_t>(1e9 / experiment.plant.mocap.rate_hz)) {
-    if (modbus_port) {
-      modbus_ = std::make_unique<ModbusSide>(experiment.valves, *modbus_port);
-      say(fmt::format("softarm-plant: valve terminal at 127.0.0.1 port {}\n",
-                      modbus_->server.port()));
-      return;
-    }
-    // No exception may pass through LCM, so the handler only takes the message; the loop acts on
-    // it.
-    node_.subscribe(lcm_.command_channel, kCommandCapacity, [this](const ReceivedMessage& packet) {
-      command_received_ = by_torque_ ? decode(packet.bytes, torque_message_)
-                                     : decode(packet.bytes, command_message_);
-    });
-  }
-
-  void run() {
-    std::int64_t next_report_ns = arm_.time_ns();
-    while (stop_requested == 0) {
-      const std::int64_t deadline_ns = std::min(next_report_ns, arm_.next_event_ns()) + lost_ns_;
-      modbus_ ? serve_requests(deadline_ns) : take_commands(deadline_ns);
-      advance();
-      for (MocapFrame frame; arm_.receive(frame);) {
-        mocap_.publish(node_, frame, (frame.capture_ns + lost_ns_) / 1000);
-      }
-      if (arm_.time_ns() >= next_report_ns) {
-        publish_state();
-        next_report_ns = std::max(next_report_ns + report_period_ns_, arm_.time_ns());
-      }
-    }
-  }
-
- private:
-  static constexpr int kCommandCapacity = 64;
-  /// What the arm catches up with after a stall. Beyond that its time stands still, or a machine
-  /// that is too slow would fall behind further with every step.
-  static constexpr std::int64_t kMostBehind_ns = 250'000'000;
-
-  void take_commands(std::int64_t deadline_ns) {
-    if (!node_.wait_until(deadline_ns)) return;
-    // All that came meanwhile: a full queue would keep the oldest commands and drop the newest.
-    int taken = 0;
-    do {
-      if (std::exchange(command_received_, false)) take_command();
-    } while (++taken < kCommandCapacity && node_.drain(1) > 0);
-  }
-
-  /// What is written holds until the terminal's own time-out, counted from the last request.
-  void serve_requests(std::int64_t deadline_ns) {
-    if (!modbus_->server.wait_until(deadline_ns)) return;
-    advance();
-    SimulatedTerminal& terminal = modbus_->terminal;
-    terminal.measure(arm_.measured_pressures_bar());
-    modbus_->server.serve(terminal);
-    if (!terminal.take_served()) return;
-    const Eigen::VectorXd& bar = terminal.set_points_bar();
-    const double timeout_s = terminal.timeout_s();
-    arm_.command({.sequence = modbus_->sequence++,
-                  .validity_ns = timeout_s > 0.0 ? static_cast<std::int64_t>(1e9 * timeout_s)
-                                                 : CommandExpiry::kNever,
-                  .pressure_bar = {bar.data(), static_cast<std::size_t>(bar.size())}},
-                 arm_now_ns());
-  }
-
-  /// The arm's own time: the monotonic clock without what was lost.
-  std::int64_t arm_now_ns() {
-    const std::int64_t now_ns = monotonic_now_ns() - lost_ns_;
-    const std::int64_t excess_ns = now_ns - arm_.time_ns() - kMostBehind_ns;
-    if (excess_ns <= 0) return now_ns;
-    lost_ns_ += excess_ns;
-    say(fmt::format("softarm-plant: {:.3f} s behind real time; the arm stood still meanwhile\n",
-                    1e-9 * static_cast<double>(excess_ns)));
-    return now_ns - excess_ns;
-  }
-
-  void advance() {
-    const bool was_vented = arm_.vented();
-    arm_.advance_to(arm_now_ns());
-    if (!arm_.vented() || was_vented) return;
-    say("softarm-plant: commands have stopped; vented\n");
-    if (modbus_) modbus_->terminal.reset_outputs();
-  }
-
-  void take_command() {
-    by_torque_ ? take_command(torque_message_, torque_message_.torque_nm)
-               : take_command(command_message_, command_message_.pressure_bar);
-  }
-
-  template <class Message, class Values>
-  void take_command(const Message& message, const Values& values) {
-    pressure_bar_.assign(values.begin(), values.end());
-    const bool was_vented = arm_.vented();
-    const CommandVerdict verdict =
-        arm_.command({.sequence = message.sequence,
-                      .validity_ns = std::int64_t{message.validity_us} * 1000,
-                      .shadow = message.shadow != 0,
-                      .pressure_bar = pressure_bar_},
-                     arm_now_ns());
-    if (was_vented && verdict == CommandVerdict::in_force)
-      say("softarm-plant: commands have begun\n");
-  }
-
-  void publish_state() {
-    const ArmPlant& plant = arm_.plant();
-    const Eigen::VectorXd& pressure = arm_.measured_pressures_bar();
-    measurement_message_.time_us = (arm_.time_ns() + lost_ns_) / 1000;
-    measurement_message_.sequence = arm_.sequence();
-    measurement_message_.num_chambers = static_cast<std::int16_t>(pressure.size());
-    measurement_message_.pressure_bar.assign(pressure.begin(), pressure.end());
-    if (!by_torque_ && !modbus_) node_.publish(lcm_.measurement_channel, measurement_message_);
-
-    const SegmentVector u = plant.u_rad();
-    const SegmentVector velocity = plant.velocity_radps();
-    state_message_.time_us = measurement_message_.time_us;
-    state_message_.vented = arm_.vented() ? 1 : 0;
-    state_message_.num_segments = static_cast<std::int16_t>(plant.segments());
-    state_message_.num_chambers = measurement_message_.num_chambers;
-    state_message_.u_rad.clear();
-    state_message_.velocity_radps.clear();
-    for (int i = 0; i < plant.segments(); ++i) {
-      state_message_.u_rad.push_back({u[2 * i], u[2 * i + 1]});
-      state_message_.velocity_radps.push_back({velocity[2 * i], velocity[2 * i + 1]});
-    }
-    state_message_.pressure_bar = measurement_message_.pressure_bar;
-    const Eigen::Vector3d tip = plant.tip_m();
-    for (int axis = 0; axis < 3; ++axis) state_message_.tip_m[axis] = tip[axis];
-    node_.publish(lcm_.plant_channel, state_message_);
-  }
-
-  LcmSettings lcm_;
-  MocapSender mocap_;
-  LcmNode node_;
-  SimulatedArm arm_;
-  std::unique_ptr<ModbusSide> modbus_;
-  bool by_torque_;
-  std::int64_t report_period_ns_;
-  std::int64_t lost_ns_ = 0;
-  bool command_received_ = false;
-  std::vector<double> pressure_bar_;
-  softarm_messages::pressure_command_t command_message_;
-  softarm_messages::torque_command_t torque_message_;
-  softarm_messages::pressure_measurement_t measurement_message_;
-  softarm_messages::plant_state_t state_message_;
-};
 
 int serve(const std::string& path, const std::string& sensor_suffix,
           std::optional<int> modbus_port) {
@@ -202,7 +30,7 @@ int serve(const std::string& path, const std::string& sensor_suffix,
     throw ConfigError(path, 0, "actuation.kind",
                       "chambers with --modbus: a terminal has valves, not moments", "torque");
   const InstanceLock lock(lock_name(lcm.mocap_channel, lcm.url));
-  // With softarm-valves there, measured pressures are its to publish.
+  // With --modbus, softarm-valves publishes the measured pressures.
   std::optional<InstanceLock> measurement_lock;
   if (!by_torque && !modbus_port)
     measurement_lock.emplace(lock_name(lcm.measurement_channel, lcm.url));
@@ -232,7 +60,7 @@ int main(int argc, char** argv) {
       ->type_name("PORT");
   app.add_option("--sensor-suffix", sensor_suffix,
                  "of the channels for motion capture and measured pressures: with _CLEAN, "
-                 "softarm-fault stands between them and softarmd");
+                 "softarm-dev fault can pass them on to softarmd");
   return softarm::run_program(argc, argv, app,
                               [&] { return softarm::serve(config, sensor_suffix, modbus_port); });
 }

@@ -2,4 +2,4 @@
 // back.
 #include "softarm/apps/valve_driver.hpp"
 
-int main(int argc, char** argv) { return softarm::run_valve_driver("softarm-valves", argc, argv); }
+int main(int argc, char** argv) { return softarm::run_valve_driver(argc, argv); }

@@ -1,5 +1,5 @@
-// softarm check: is this configuration right, and what does it say in full? With --live: does the
-// arm that is running fit it?
+// softarm check: checks a configuration and prints it in full. With --live: checks whether the
+// running arm fits it.
 #include <fmt/format.h>
 
 #include <memory>
@@ -16,13 +16,14 @@ namespace {
 struct CheckOptions {
   std::string file;
   bool print_template = false;
+  bool print_schema = false;
   bool live = false;
   LiveCheckOptions live_check;
 };
 
 int check(const CheckOptions& options) {
-  if (options.print_template) {
-    fmt::print("{}", template_text());
+  if (options.print_template || options.print_schema) {
+    fmt::print("{}", options.print_template ? template_text() : schema_text());
     return kExitOk;
   }
   const Experiment experiment = load_experiment(options.file);
@@ -75,6 +76,8 @@ void add_check_command(CLI::App& app) {
   group->add_option("CONFIG", options->file, "experiment in YAML");
   group->add_flag("--template", options->print_template,
                   "print a configuration that documents every key instead");
+  group->add_flag("--schema", options->print_schema,
+                  "print a JSON Schema instead, by which editors complete and check an experiment");
   add_live_options(*command, *options);
   command->callback([options] {
     if (const int code = check(*options); code != kExitOk) throw CLI::RuntimeError(code);

@@ -13,7 +13,7 @@ namespace {
 
 constexpr int kMaxEvalSegments = 1000;
 
-/// A node with its place, for messages.
+/// A node with its location, for messages.
 struct Place {
   const std::string& file;
   YAML::Node node;

@@ -1,64 +1,55 @@
 // softarm eval: the model's terms for given states, to compare with other programs.
 #include <cstdio>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <string>
 
 #include "apps/softarm/commands.hpp"
 #include "apps/softarm/eval_case.hpp"
-#include "softarm/base/json_writer.hpp"
 
 namespace softarm {
 namespace {
 
-void write_vector(JsonWriter& json, const Eigen::Ref<const Eigen::VectorXd>& v) {
-  json.open_array();
-  for (Eigen::Index i = 0; i < v.size(); ++i) json.value(v(i));
-  json.close_array();
+using Json = nlohmann::ordered_json;
+
+Json vector_json(const Eigen::Ref<const Eigen::VectorXd>& v) {
+  return std::vector<double>(v.begin(), v.end());
 }
 
-void write_matrix(JsonWriter& json, const Eigen::MatrixXd& m) {
-  json.open_array();
-  for (Eigen::Index i = 0; i < m.rows(); ++i) write_vector(json, m.row(i).transpose());
-  json.close_array();
+Json matrix_json(const Eigen::MatrixXd& m) {
+  Json rows = Json::array();
+  for (Eigen::Index i = 0; i < m.rows(); ++i) rows.push_back(vector_json(m.row(i).transpose()));
+  return rows;
 }
 
-void write_term(JsonWriter& json, const EvalTerm& term) {
+Json term_json(const EvalTerm& term) {
   bool finite = !term.matrices.empty();
   for (const auto& m : term.matrices) finite = finite && m.allFinite();
-  if (!finite) return json.null();
+  if (!finite) return nullptr;
   switch (term.shape) {
     case EvalTerm::Shape::number:
-      return json.value(term.matrices.front()(0, 0));
+      return term.matrices.front()(0, 0);
     case EvalTerm::Shape::vector:
-      return write_vector(json, term.matrices.front().col(0));
+      return vector_json(term.matrices.front().col(0));
     case EvalTerm::Shape::matrix:
-      return write_matrix(json, term.matrices.front());
+      return matrix_json(term.matrices.front());
     case EvalTerm::Shape::list:
-      json.open_array();
-      for (const auto& m : term.matrices) write_matrix(json, m);
-      json.close_array();
+      break;
   }
+  Json list = Json::array();
+  for (const auto& m : term.matrices) list.push_back(matrix_json(m));
+  return list;
 }
 
 std::string evaluate_file(const std::string& file, MassModel mass, EvalMethod method) {
-  JsonWriter json;
-  json.open_object();
-  json.key("cases");
-  json.open_array();
+  Json cases = Json::array();
   for (EvalCase& one : read_eval_cases(file)) {
     one.arm.mass = mass;
-    json.open_object();
-    json.member("id", one.id);
-    for (const NamedTerm& term : evaluate(one, method)) {
-      json.key(term.name);
-      write_term(json, term.term);
-    }
-    json.close_object();
+    Json& terms = cases.emplace_back(Json{{"id", one.id}});
+    for (const NamedTerm& term : evaluate(one, method)) terms[term.name] = term_json(term.term);
   }
-  json.close_array();
-  json.close_object();
-  return json.text() + "\n";
+  return Json{{"cases", std::move(cases)}}.dump() + "\n";
 }
 
 }  // namespace

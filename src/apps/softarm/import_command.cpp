@@ -1,4 +1,4 @@
-// softarm import: a laboratory's table becomes a log of our messages.
+// softarm import: converts a laboratory's table to a log of our messages.
 #include <fmt/format.h>
 
 #include <memory>

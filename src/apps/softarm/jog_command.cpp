@@ -1,9 +1,10 @@
-// softarm jog: one chamber by hand, for as long as a key is held.
+// softarm jog: fills one chamber while a key is held.
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <memory>
 #include <string>
+#include <utility>
 
 #include "apps/program.hpp"
 #include "apps/progress.hpp"
@@ -11,15 +12,13 @@
 #include "apps/softarm/commands.hpp"
 #include "apps/softarm/key_hold.hpp"
 #include "apps/softarm/raw_terminal.hpp"
-#include "softarm/base/clock.hpp"
-#include "softarm/client/arm_listener.hpp"
-#include "softarm/client/commander.hpp"
+#include "softarm/client/arm_client.hpp"
 #include "softarm/config/load.hpp"
 
 namespace softarm {
 namespace {
 
-constexpr std::int64_t kListen_ns = 500'000'000;  ///< for others, before the first command
+constexpr double kListen_s = 0.5;  ///< for other senders, before the first command
 constexpr std::int64_t kFrameCounts_ns = 200'000'000;
 constexpr int kQuit = 'q';
 
@@ -29,7 +28,7 @@ struct JogOptions {
   double pressure_bar = 0.0;
 };
 
-/// What is wrong with the request; empty where nothing is.
+/// The fault of the request; empty if it has none.
 std::string refusal(const Experiment& experiment, const JogOptions& options) {
   const ActuationSettings& actuation = experiment.actuation;
   if (actuation.kind == ActuationKind::torque)
@@ -51,38 +50,28 @@ std::string refusal(const Experiment& experiment, const JogOptions& options) {
 class Jog {
  public:
   Jog(const Experiment& experiment, const JogOptions& options)
-      : experiment_(experiment),
-        options_(options),
-        node_(experiment.transport.lcm.url),
-        commander_(experiment, node_),
-        listener_(experiment, node_, false),
-        filled_bar_(PressureVector::Constant(commander_.chambers(),
-                                             experiment.actuation.min_pressure_bar)) {
+      : options_(options), client_(experiment) {
+    client_.lock_commands();
+    filled_bar_ = PressureVector::Constant(client_.set_points_bar().size(),
+                                           experiment.actuation.min_pressure_bar);
     for (int i = 0; i + 1 < options.segment; ++i)
-      valve_ += static_cast<int>(experiment.actuation.segments[static_cast<std::size_t>(i)].size());
+      valve_ += std::ssize(experiment.actuation.segments[static_cast<std::size_t>(i)]);
     valve_ += options.chamber - 1;
     filled_bar_[valve_] = options.pressure_bar;
   }
 
   int run() {
-    const std::int64_t listened_ns = monotonic_now_ns() + kListen_ns;
-    while (monotonic_now_ns() < listened_ns && stop_requested == 0) node_.wait_until(listened_ns);
-    if (const std::string other = listener_.other_commander(); !other.empty()) {
+    client_.wait_for([] { return stop_requested != 0; }, kListen_s);
+    if (const std::string other = client_.other_commander(); !other.empty()) {
       print_error("softarm", other);
       return kExitOtherInstance;
     }
-    listener_.commanding();
     const RawTerminal terminal;
     fmt::print("hold a key to fill chamber {} of segment {} with {:.3f} bar; q ends\n",
                options_.chamber, options_.segment, options_.pressure_bar);
     std::fflush(stdout);
-    try {
-      follow_keys(terminal);
-    } catch (...) {
-      commander_.vent_to_rest();
-      throw;
-    }
-    commander_.vent_to_rest();
+    follow_keys(terminal);
+    client_.vent_to_rest();
     return kExitOk;
   }
 
@@ -90,65 +79,61 @@ class Jog {
   void follow_keys(const RawTerminal& terminal) {
     Progress progress(true);
     KeyHold hold;
-    std::int64_t before_ns = monotonic_now_ns();
+    std::int64_t before_ns = client_.now_ns();
     while (stop_requested == 0) {
-      const std::int64_t now_ns = monotonic_now_ns();
-      // Keys that queued up while we were held up (Ctrl-Z, fg) are not being held.
+      const std::int64_t now_ns = client_.now_ns();
+      // Keys queued while the program was stopped (Ctrl-Z, fg) are not being held.
       if (now_ns - std::exchange(before_ns, now_ns) > KeyHold::kNext_ns) terminal.begin_anew();
       const int key = terminal.key();
       if (key == kQuit || key == RawTerminal::kGone) return;
       if (key != 0) hold.event(now_ns);
       const bool held = hold.held(now_ns);
       if (!held) beyond_.clear();  // the next press may try again
-      if (held && beyond_.empty()) watch(now_ns);
+      if (held && beyond_.empty()) watch();
       if (held && beyond_.empty())
-        commander_.update(filled_bar_, experiment_.actuation.slew_bar_per_s, now_ns);
+        client_.command_chambers(filled_bar_);
       else
-        commander_.vent(now_ns);
-      node_.wait_until(commander_.next_ns());
-      listener_.look_at_clock();
+        client_.vent();
+      client_.update(client_.next_command_ns());
       progress.update(text(held));
     }
   }
 
-  void watch(std::int64_t now_ns) {
-    const double most_rad = experiment_.identification.max_theta_rad;
-    if (sees_arm(now_ns) && listener_.largest_theta_rad() > most_rad)
+  void watch() {
+    const double most_rad = client_.experiment().motion_limits.max_theta_rad;
+    if (sees_arm() && client_.seen().bend_rad > most_rad)
       beyond_ = fmt::format(
-          "vented: a segment bends beyond identification.max_theta_rad of {:.3g} "
-          "rad",
-          most_rad);
-    if (listener_.daemon_armed(now_ns)) beyond_ = "vented: a daemon is armed";
+          "vented: a segment bends beyond identification.max_theta_rad of {:.3g} rad", most_rad);
+    if (const std::string other = client_.other_commander(); !other.empty())
+      beyond_ = client_.daemon_armed() ? "vented: a daemon is armed" : "vented: " + other;
   }
 
-  bool sees_arm(std::int64_t now_ns) const {
-    return listener_.whole_frame_ns() > now_ns - kFrameCounts_ns;
+  bool sees_arm() const {
+    const std::int64_t seen_ns = client_.seen().arrival_ns;
+    return seen_ns != kNever && client_.now_ns() - seen_ns < kFrameCounts_ns;
   }
 
   std::string text(bool held) const {
-    const auto valve = static_cast<std::size_t>(valve_);
+    const auto& measured = client_.measured();
     std::string text = fmt::format("{:<8} set {:.3f} bar  measured {}", held ? "HELD" : "released",
-                                   commander_.sent_bar()[valve_],
-                                   valve < listener_.measured_bar().size()
-                                       ? fmt::format("{:.3f} bar", listener_.measured_bar()[valve])
+                                   client_.set_points_bar()[valve_],
+                                   measured && valve_ < measured->bar.size()
+                                       ? fmt::format("{:.3f} bar", measured->bar[valve_])
                                        : "-");
-    if (!sees_arm(monotonic_now_ns())) {
+    if (!sees_arm()) {
       text += "  no frame shows every segment: bend is not watched";
     } else {
-      for (Eigen::Index k = 0; k + 1 < listener_.u_rad().size(); k += 2)
-        text += fmt::format("  u{} ({:+.3f}, {:+.3f}) rad", k / 2 + 1, listener_.u_rad()[k],
-                            listener_.u_rad()[k + 1]);
+      const SegmentVector& u_rad = client_.seen().u_rad;
+      for (Eigen::Index k = 0; k + 1 < u_rad.size(); k += 2)
+        text += fmt::format("  u{} ({:+.3f}, {:+.3f}) rad", k / 2 + 1, u_rad[k], u_rad[k + 1]);
     }
     return text + (beyond_.empty() ? "" : "  " + beyond_);
   }
 
-  const Experiment& experiment_;
   const JogOptions& options_;
-  LcmNode node_;
-  Commander commander_;
-  ArmListener listener_;
+  ArmClient client_;
   PressureVector filled_bar_;
-  int valve_ = 0;
+  Eigen::Index valve_ = 0;
   std::string beyond_;
 };
 

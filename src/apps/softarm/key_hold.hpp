@@ -1,12 +1,14 @@
-// Is a key being held? A terminal only tells that it repeats.
+// Detects whether a key is held: a terminal only reports that it repeats.
 #pragma once
 
 #include <cstdint>
 
+#include "softarm/base/time.hpp"
+
 namespace softarm {
 
-/// Held from the first event until the repeats stay away. Keyboards repeat after 0.25 to 0.7 s for
-/// the first time and then 10 to 30 times a second, so the first wait is longer.
+/// Held from the first event until the repeats end. Keyboards repeat after 0.25 to 0.7 s for the
+/// first time and then 10 to 30 times a second, so the first wait is longer.
 class KeyHold {
  public:
   static constexpr std::int64_t kFirst_ns = 750'000'000;
@@ -21,7 +23,6 @@ class KeyHold {
   }
 
  private:
-  static constexpr std::int64_t kNever = INT64_MIN;
   std::int64_t last_ns_ = kNever;
   bool repeats_ = false;
 };

@@ -2,29 +2,25 @@
 
 #include <fmt/format.h>
 
-#include <memory>
-
 #include "apps/program.hpp"
 #include "apps/progress.hpp"
 #include "apps/signals.hpp"
-#include "softarm/base/clock.hpp"
+#include "softarm/base/time.hpp"
 #include "softarm/commissioning/preflight/checks.hpp"
 
 namespace softarm {
 namespace {
 
-void listen(LcmNode& node, ArmListener& listener, double time_s, Progress& progress) {
-  const std::int64_t start_ns = monotonic_now_ns();
-  const auto end_ns = start_ns + static_cast<std::int64_t>(1e9 * time_s);
-  for (std::int64_t now_ns = start_ns; now_ns < end_ns && stop_requested == 0;
-       now_ns = monotonic_now_ns()) {
-    node.wait_until(std::min(end_ns, now_ns + 10'000'000));
-    listener.look_at_clock();
+void listen(ArmClient& client, Observer& observer, double time_s, Progress& progress) {
+  const std::int64_t start_ns = client.now_ns();
+  const auto interrupted = [&] {
     progress.update(fmt::format("listening: {:.0f} of {:.0f} s, {} frames",
-                                1e-9 * static_cast<double>(now_ns - start_ns), time_s,
-                                listener.seen().frames.size()));
-  }
-  listener.seen().rest_end_ns = monotonic_now_ns();
+                                to_seconds(client.now_ns() - start_ns), time_s,
+                                observer.seen().frames.size()));
+    return stop_requested != 0;
+  };
+  client.wait_for(interrupted, time_s);
+  observer.rest_ends();
 }
 
 int print(const std::vector<Finding>& findings, bool json) {
@@ -32,29 +28,35 @@ int print(const std::vector<Finding>& findings, bool json) {
   return any_failed(findings) ? kExitFailure : kExitOk;
 }
 
-int pulse(const Experiment& experiment, const LiveCheckOptions& options, LcmNode& node,
-          ArmListener& listener, Commander& commander, Progress& progress) {
-  const std::vector<Finding> at_rest = preflight(experiment, listener.seen());
-  if (const std::string other = listener.other_commander(); !other.empty()) {
+int pulse(const LiveCheckOptions& options, ArmClient& client, Observer& observer,
+          Progress& progress) {
+  const Experiment& experiment = client.experiment();
+  std::string other = client.other_commander();
+  if (other.empty() && observer.seen().commanded_by_others)
+    other = "another program commanded pressures on " + experiment.transport.lcm.command_channel;
+  const std::vector<Finding> at_rest = preflight(experiment, observer.seen());
+  if (!other.empty()) {
     print(at_rest, options.json);
     print_error("softarm", "no chamber was filled: " + other);
     return kExitOtherInstance;
   }
   if (const std::string obstacle = obstacle_to_pulses(at_rest); !obstacle.empty()) {
     print(at_rest, options.json);
-    print_error("softarm",
-                "no chamber was filled: without these nobody would watch its limits: " + obstacle);
+    print_error(
+        "softarm",
+        "no chamber was filled: its limits could not be watched without these: " + obstacle);
     return kExitFailure;
   }
   say("softarm check: filling every chamber softly, one after the other: THE ARM MOVES. Ctrl-C "
       "vents.\n");
   const std::string aborted = play_pulses(
-      experiment, options.plan, node, listener, commander, [] { return stop_requested != 0; },
+      client, observer, options.plan, [] { return stop_requested != 0; },
       [&](const std::string& text) { progress.update(text); });
-  const int code = print(preflight(experiment, listener.seen()), options.json);
+  const int code = print(preflight(experiment, observer.seen()), options.json);
   if (aborted.empty()) return code;
-  print_error("softarm", fmt::format("vented after {} of {} chambers: {}",
-                                     listener.seen().pulses.size(), commander.chambers(), aborted));
+  print_error("softarm",
+              fmt::format("vented after {} of {} chambers: {}", observer.seen().pulses.size(),
+                          chamber_count(experiment.actuation), aborted));
   return kExitFailure;
 }
 
@@ -76,19 +78,18 @@ int check_live(const Experiment& experiment, const LiveCheckOptions& options) {
   }
   catch_stop_signals();
   ignore_broken_pipes();
-  LcmNode node(experiment.transport.lcm.url);
-  // First of all: nobody may begin to command while we listen.
-  std::unique_ptr<Commander> commander;
-  if (options.pulse) commander = std::make_unique<Commander>(experiment, node);
-  ArmListener listener(experiment, node, true);
+  ArmClient client(experiment);
+  // First of all, so that no other program begins to command while this one listens.
+  if (options.pulse) client.lock_commands();
+  Observer observer(client);
   Progress progress(!options.json);
-  listen(node, listener, options.listen_s, progress);
+  listen(client, observer, options.listen_s, progress);
   if (stop_requested != 0) {
     print_error("softarm", "interrupted while listening: nothing was commanded or judged");
     return kExitFailure;
   }
-  if (commander) return pulse(experiment, options, node, listener, *commander, progress);
-  return print(preflight(experiment, listener.seen()), options.json);
+  if (options.pulse) return pulse(options, client, observer, progress);
+  return print(preflight(experiment, observer.seen()), options.json);
 }
 
 }  // namespace softarm

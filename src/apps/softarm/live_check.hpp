@@ -15,7 +15,7 @@ struct LiveCheckOptions {
 
 /// Prints the report on standard output. Returns kExitOk where nothing failed, kExitFailure where
 /// something did or the pulses could not be played, kExitOtherInstance where pulses were asked for
-/// and somebody else commands the arm.
+/// and another program commands the arm.
 /// @throws TransportError
 int check_live(const Experiment& experiment, const LiveCheckOptions& options);
 

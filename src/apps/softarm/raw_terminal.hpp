@@ -9,13 +9,14 @@
 
 namespace softarm {
 
-/// Standard input as raw keys for as long as it lives; Ctrl-C still is a signal.
+/// Standard input as raw keys during its lifetime; Ctrl-C remains a signal.
 class RawTerminal {
  public:
-  /// @throws std::runtime_error where standard input is no terminal
+  /// @throws std::runtime_error where standard input is not a terminal
   RawTerminal() {
     if (tcgetattr(STDIN_FILENO, &before_) != 0)
-      throw std::runtime_error("standard input is no terminal: keys cannot be held there");
+      throw std::runtime_error(
+          "standard input is not a terminal: expected one, whose keys can be held");
     raw_ = before_;
     raw_.c_lflag &= ~static_cast<tcflag_t>(ICANON | ECHO);
     raw_.c_cc[VMIN] = 0;
@@ -26,12 +27,11 @@ class RawTerminal {
   RawTerminal(const RawTerminal&) = delete;
   RawTerminal& operator=(const RawTerminal&) = delete;
 
-  /// Forgets the keys that wait. Raw again, too: a shell has its own ways with the terminal of a
-  /// program that was stopped.
+  /// Discards pending keys and sets raw mode again: a shell resets the terminal of a program that
+  /// was stopped.
   void begin_anew() const { tcsetattr(STDIN_FILENO, TCSAFLUSH, &raw_); }
 
-  /// What came since the last call: the newest key, 0 where none did, kGone where the terminal is
-  /// gone.
+  /// The newest key since the last call, 0 if there was none, kGone if the terminal is gone.
   static constexpr int kGone = -1;
   int key() const {
     pollfd input{.fd = STDIN_FILENO, .events = POLLIN, .revents = 0};

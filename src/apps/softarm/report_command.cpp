@@ -1,11 +1,9 @@
-// softarm report: what a recorded LCM log (lcm-logger) tells of a run, in the same files and plots
+// softarm report: evaluates a recorded LCM log (lcm-logger) of a run, with the same files and plots
 // as `softarm run`.
 #include <fmt/format.h>
 
 #include <filesystem>
-#include <fstream>
 #include <memory>
-#include <stdexcept>
 
 #include "apps/program.hpp"
 #include "apps/progress.hpp"
@@ -27,17 +25,12 @@ struct ReportOptions {
 
 int report(const ReportOptions& options) {
   const Experiment experiment = load_experiment(options.config);
-  std::ifstream file(options.log, std::ios::binary);
-  if (!file) {
-    throw std::runtime_error(
-        fmt::format("cannot read {}: is it an LCM log (lcm-logger)?", options.log));
-  }
+  EventLogReader log(std::filesystem::path(options.log));
   const auto size = static_cast<double>(std::filesystem::file_size(options.log));
-  EventLogReader log(file);
   StatusRecord record(experiment, options.out);
   Progress progress;
   for (LogEvent event; log.next(event);) {
-    if (record.take(event.channel, event.data)) record.write_rows(false);
+    record.take(event.channel, event.data);
     if (progress.due()) {
       progress.update(fmt::format("{:3.0f} % of {}, {:.0f} s",
                                   100.0 * static_cast<double>(log.position()) / size, options.log,
@@ -47,17 +40,16 @@ int report(const ReportOptions& options) {
   record.close();
   if (record.rows() == 0) {
     print_error("softarm", fmt::format("{} holds no status of an arm of {} segments on channel {}; "
-                                       "daemon.lcm.status_channel says which to look for",
+                                       "daemon.lcm.status_channel is the one expected",
                                        options.log, experiment.arm.size(),
                                        experiment.transport.lcm.status_channel));
     return kExitData;
   }
-  if (static_cast<std::uint64_t>(record.status().configuration_hash) != experiment.hash) {
+  if (record.status().configuration_hash != experiment.hash) {
     say(fmt::format(
         "softarm: warning: the log was made with configuration {:016x}, {} is {:016x}: what the "
-        "report takes from the configuration may not be what was in force\n",
-        static_cast<std::uint64_t>(record.status().configuration_hash), options.config,
-        experiment.hash));
+        "report takes from the configuration may differ from what was in force\n",
+        record.status().configuration_hash, options.config, experiment.hash));
   }
   fmt::print("{}log, summary and timing are in {}\n", record.table(), options.out);
   if (options.plots) draw_plots(options.out);

@@ -11,6 +11,7 @@
 #include "apps/softarm/commands.hpp"
 #include "apps/softarm/plots.hpp"
 #include "softarm/base/clock.hpp"
+#include "softarm/base/time.hpp"
 #include "softarm/config/load.hpp"
 #include "softarm/recording/experiment_log.hpp"
 #include "softarm/recording/logged_run.hpp"
@@ -32,12 +33,12 @@ struct RunOptions {
 };
 
 struct Recorded {
-  std::int64_t took_ns = 0;  ///< wall time, log and all
+  std::int64_t took_ns = 0;  ///< wall time, with the log
   bool was_active = false;
 };
 
-/// Steps whatever makes the rows to its end, or to `duration_s`; every tick, or every
-/// `ticks_a_row` of them, is a row.
+/// Steps the source of the rows to its end, or to `duration_s`; one row per tick, or per
+/// `ticks_a_row` ticks.
 template <class Stepper>
 Recorded record(Stepper& stepper, double duration_s, double period_s, std::int64_t ticks_a_row,
                 ExperimentLog& log, ShapeLog& shapes, TrackingSummary& summary) {
@@ -63,7 +64,7 @@ Recorded record(Stepper& stepper, double duration_s, double period_s, std::int64
   return recorded;
 }
 
-/// Why an arm was never ACTIVE, from where it stood at the end.
+/// Why an arm was never ACTIVE, from its state at the end.
 std::string never_active(const TickOutput& end, const Experiment& experiment, double duration_s) {
   std::string text = fmt::format("the arm was never ACTIVE in {:.3g} s: {} ({})", duration_s,
                                  name(end.mode), name(end.reason));
@@ -93,8 +94,8 @@ int run(const RunOptions& options) {
     const Recorded recorded =
         record(stepper, duration_s, period_s, ticks_a_row, log, shapes, summary);
     log.close();
-    timing.real_time_factor = 1e9 * summary.duration_s() /
-                              static_cast<double>(std::max<std::int64_t>(1, recorded.took_ns));
+    timing.real_time_factor =
+        summary.duration_s() / to_seconds(std::max<std::int64_t>(1, recorded.took_ns));
     if (!recorded.was_active)
       failure = never_active(stepper.pipeline().output(), experiment, summary.duration_s());
     timing.histograms = {{"tick_us", stepper.tick_times().counts(), stepper.tick_times().max_us()}};

@@ -2,17 +2,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
-#include <atomic>
-#include <iostream>
-#include <thread>
 
 #include "apps/program.hpp"
 #include "apps/signals.hpp"
-#include "softarm/base/clock.hpp"
 #include "softarm/base/instance_lock.hpp"
+#include "softarm/base/line_log.hpp"
 #include "softarm/base/realtime.hpp"
 #include "softarm/base/service_notifier.hpp"
+#include "softarm/base/time.hpp"
 #include "softarm/base/version.hpp"
 #include "softarm/config/load.hpp"
 #include "softarm/transport/daemon_loop.hpp"
@@ -21,75 +18,6 @@
 
 namespace softarm {
 namespace {
-
-/// Hands mode changes, and what was refused, from the tick's thread to one that may wait for a
-/// terminal or a journal. Bounded: what does not fit is counted, not queued.
-class ModeLog {
- public:
-  ModeLog() : thread_([this](const std::stop_token& stop) { print_until(stop); }) {}
-
-  /// Prints what is still to be printed and ends the thread.
-  void finish() { thread_ = {}; }
-
-  void add(std::int64_t since_start_ns, Mode mode, Reason reason) noexcept {
-    const std::size_t head = head_.load(std::memory_order_relaxed);
-    if (head - tail_.load(std::memory_order_acquire) == kCapacity) {
-      lost_.fetch_add(1, std::memory_order_relaxed);
-      return;
-    }
-    entries_[head % kCapacity] = {since_start_ns, mode, reason};
-    head_.store(head + 1, std::memory_order_release);
-  }
-
-  /// How many messages were refused so far.
-  void malformed(std::int64_t total) noexcept {
-    malformed_.store(total, std::memory_order_relaxed);
-  }
-
- private:
-  static constexpr std::size_t kCapacity = 64;
-  static constexpr std::int64_t kTellEvery_ns = 1'000'000'000;
-  struct Entry {
-    std::int64_t since_start_ns;
-    Mode mode;
-    Reason reason;
-  };
-
-  /// What is malformed comes at any rate; it is told once a second at most.
-  void print_malformed(bool last) {
-    const std::int64_t total = malformed_.load(std::memory_order_relaxed);
-    const std::int64_t now_ns = monotonic_now_ns();
-    if (total == malformed_told_ || (!last && now_ns - malformed_told_ns_ < kTellEvery_ns)) return;
-    say(fmt::format("softarmd: {} malformed messages refused, {} in all\n", total - malformed_told_,
-                    total));
-    malformed_told_ = total;
-    malformed_told_ns_ = now_ns;
-  }
-
-  void print_until(const std::stop_token& stop) {
-    while (true) {
-      const bool last = stop.stop_requested();
-      for (std::size_t tail = tail_.load(); tail != head_.load(std::memory_order_acquire);
-           tail_.store(++tail)) {
-        const Entry& entry = entries_[tail % kCapacity];
-        say(fmt::format("softarmd: {:.3f} s: {} ({})\n",
-                        1e-9 * static_cast<double>(entry.since_start_ns), name(entry.mode),
-                        name(entry.reason)));
-      }
-      if (const auto lost = lost_.exchange(0); lost > 0)
-        say(fmt::format("softarmd: {} mode changes came too fast to be printed\n", lost));
-      print_malformed(last);
-      if (last) return;
-      std::this_thread::sleep_for(std::chrono::milliseconds(50));
-    }
-  }
-
-  std::array<Entry, kCapacity> entries_{};
-  std::atomic<std::size_t> head_{0}, tail_{0};
-  std::atomic<std::int64_t> lost_{0}, malformed_{0};
-  std::int64_t malformed_told_ = 0, malformed_told_ns_ = 0;
-  std::jthread thread_;
-};
 
 void print_summary(const DaemonLoop& loop) {
   const LoopTiming& timing = loop.timing();
@@ -111,24 +39,35 @@ void print_summary(const DaemonLoop& loop) {
       loop.link().malformed(), loop.link().unsent()));
 }
 
-/// Prints every change of mode or reason, and reports to the service manager.
-void run(DaemonLoop& loop, ModeLog& log, ServiceNotifier& service) {
+/// Prints every change of mode or reason, and what was refused; reports to the service manager.
+void run(DaemonLoop& loop, LineLog& log, ServiceNotifier& service) {
+  constexpr std::int64_t kRefused_ns = 1'000'000'000;  // malformed messages may come at any rate
   Mode mode = Mode::init;
   Reason reason = Reason::none;
+  std::int64_t refused = 0, refused_reported_ns = kNever;
+  const auto report_refused = [&](std::int64_t now_ns) {
+    const std::int64_t total = loop.link().malformed();
+    if (total == refused || now_ns < refused_reported_ns + kRefused_ns) return;
+    log.add("{} malformed messages refused, {} in all", total - refused, total);
+    refused = total;
+    refused_reported_ns = now_ns;
+  };
   loop.run([] { return stop_requested != 0; },
            [&](const DaemonLoop::Report& report) {
              const TickOutput& output = loop.pipeline().output();
              if (output.mode != mode || output.reason != reason) {
                mode = output.mode;
                reason = output.reason;
-               log.add(report.since_start_ns, mode, reason);
+               log.add("{:.3f} s: {} ({})", to_seconds(report.since_start_ns), name(mode),
+                       name(reason));
              }
-             log.malformed(loop.link().malformed());
+             report_refused(report.woken_ns);
              service.report(report.woken_ns, {.state = name(mode),
                                               .reason = name(reason),
                                               .on_time = report.on_time,
                                               .stopping = report.stopping});
            });
+  report_refused(kForever);
 }
 
 int serve(const std::string& path, bool shadow) {
@@ -147,11 +86,12 @@ int serve(const std::string& path, bool shadow) {
     say(fmt::format("softarmd: warning: {}\n", warning));
   ServiceNotifier service;
   if (!service.problem().empty()) say(fmt::format("softarmd: warning: {}\n", service.problem()));
-  // A thread inherits the scheduling in force when it starts. The one that prints gets none of it;
-  // LCM's receive thread stays one below the tick, which a flood of messages would else starve.
-  ModeLog log;
-  // The tick's own priority is asked for first, and its refusal told: whatever is refused later is
-  // the same, or less was asked for.
+  // A thread inherits the scheduling in force when it starts. The printing thread gets none of it;
+  // LCM's receive thread stays one below the tick, which a flood of messages would otherwise
+  // starve.
+  LineLog log("softarmd", say);
+  // The tick's priority is requested first and its refusal is reported: a later refusal has the
+  // same cause, or is for a lower priority.
   const RealtimeSettings& realtime = experiment.realtime;
   for (const std::string& refused : apply_realtime_settings(realtime))
     say(fmt::format("softarmd: warning: {}\n", refused));

@@ -2,14 +2,13 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/LU>
 #include <cmath>
 #include <span>
 #include <stdexcept>
 
 #include "softarm/estimation/curvature_estimator.hpp"
-#include "softarm/model/dynamics.hpp"
-#include "softarm/model/kinematics.hpp"
+#include "softarm/model/statics.hpp"
+#include "softarm/transport/pose_convention.hpp"
 #include "softarm/transport/settings.hpp"
 
 namespace softarm {
@@ -17,30 +16,16 @@ namespace {
 
 constexpr std::size_t kFewestFrames = 50;
 
-Eigen::Isometry3d pose_of(const PlateSettings& plate) {
-  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
-  const double angle = plate.rotation_rad.norm();
-  if (angle > 0.0)
-    pose.linear() = Eigen::AngleAxisd(angle, plate.rotation_rad / angle).toRotationMatrix();
-  pose.translation() = plate.position_m;
-  return pose;
+Eigen::Isometry3d pose_of(const MarkerFrameSettings& plate) {
+  return to_isometry(pose_on_body(plate));
 }
 
-void set(PlateSettings& plate, const Eigen::Isometry3d& pose) {
-  const Eigen::AngleAxisd turn(pose.linear());
-  plate.rotation_rad = turn.angle() * turn.axis();
-  plate.position_m = pose.translation();
-}
-
-/// K u + G(u) in N m.
-Eigen::VectorXd moments(const ArmParameters& arm, DynamicsWorkspace& workspace,
-                        const Eigen::VectorXd& u) {
-  const Eigen::VectorXd none = Eigen::VectorXd::Zero(u.size());
-  SegmentVector out(u.size());
-  inverse_dynamics(arm, workspace, u, none, none, none,
-                   {.inertia = false, .coriolis = false, .gravity = true}, out);
-  add_impedance(arm, u, none, out);
-  return out;
+/// The shape that gravity gives the arm without pressure.
+Eigen::VectorXd hanging_shape(const ArmParameters& arm) {
+  if (const auto u = rest_shape(arm, Eigen::VectorXd::Zero(arm.dof()))) return *u;
+  throw std::runtime_error(
+      "the model has no shape at rest near straight: expected stiffness that holds the arm's "
+      "weight (arm.stiffness_nm_per_rad, arm.mass_kg, arm.base.rotation)");
 }
 
 std::vector<RestReading> read_segments(const Experiment& experiment, const BodySettings& bodies,
@@ -77,27 +62,24 @@ Eigen::Isometry3d levelled(const Eigen::Isometry3d& base, const ArmParameters& a
 BodySettings plates_from(const Experiment& experiment, const Eigen::VectorXd& rest_u_rad,
                          std::span<const Eigen::Isometry3d> mean, BaseSource source) {
   BodySettings out = experiment.transport.bodies;
-  const ArmParameters& arm = experiment.arm;
-  Eigen::Isometry3d base = mean[0];
-  if (out.base_id >= 0) {
-    base = base * pose_of(out.base_plate);
-    if (source == BaseSource::arm) base = levelled(base, arm);
-    if (source == BaseSource::arm) set(out.base_plate, mean[0].inverse() * base);
-  }
-  ArmParameters at_base = arm;
+  const bool fixed = out.base_id < 0;
+  Eigen::Isometry3d base = fixed ? mean[0] : mean[0] * pose_of(out.base_plate);
+  if (!fixed && source == BaseSource::arm) base = levelled(base, experiment.arm);
+  ArmParameters at_base = experiment.arm;
   at_base.base_position_m = base.translation();
   at_base.base_rotation = base.linear();
-  std::vector<Eigen::Isometry3d> ends(static_cast<std::size_t>(arm.size()));
-  forward_kinematics(at_base, rest_u_rad, ends);
-  out.segment_plates.resize(ends.size());
-  for (std::size_t i = 0; i < ends.size(); ++i)
-    set(out.segment_plates[i], mean[i + 1].inverse() * ends[i]);
+  const std::vector<Eigen::Isometry3d> found = frames_on_bodies(at_base, rest_u_rad, mean);
+  if (!fixed && source == BaseSource::arm)
+    out.base_plate = with_pose_on_body(out.base_plate, found[0]);
+  out.segment_plates.resize(found.size() - 1);
+  for (std::size_t i = 1; i < found.size(); ++i)
+    out.segment_plates[i - 1] = with_pose_on_body(out.segment_plates[i - 1], found[i]);
   return out;
 }
 
 std::string body_name(std::size_t i) { return i == 0 ? "base" : fmt::format("segment {}", i); }
 
-/// Poses of every body over time; of a fixed base one.
+/// Poses of every body over time; one pose of a fixed base.
 std::vector<std::vector<TimedPose>> gather(const Experiment& experiment,
                                            const std::vector<MocapFrame>& frames) {
   const auto bodies = static_cast<std::size_t>(experiment.arm.size()) + 1;
@@ -123,8 +105,8 @@ std::vector<std::vector<TimedPose>> gather(const Experiment& experiment,
     if (unseen[i] > 0)
       who += fmt::format("; {} was not seen (or sent no pose) in {}", body_name(i), unseen[i]);
   throw std::runtime_error(fmt::format(
-      "expected at least {} frames with every body, got {} of {}{}; daemon.bodies says which "
-      "bodies are looked for, a longer --duration looks longer",
+      "expected at least {} frames with every body, got {} of {}{}; see daemon.bodies for the "
+      "expected bodies, or give a longer --duration",
       kFewestFrames, out[0].size(), frames.size(), who));
 }
 
@@ -134,14 +116,15 @@ void expect_still(const std::vector<PoseStatistics>& bodies) {
     const PoseStatistics& body = bodies[i];
     if (body.still()) continue;
     moving += fmt::format(
-        "{} strays {:.2f} mm and {:.1f} mrad from its mean (limits {:.2f} mm, {:.1f} mrad); ",
+        "{} is out of tolerance: {:.2f} mm and {:.1f} mrad from its mean (limits {:.2f} mm, {:.1f} "
+        "mrad); ",
         body_name(i), 1e3 * body.wander_m, 1e3 * body.wander_rad, 1e3 * body.wander_limit_m,
         1e3 * body.wander_limit_rad);
   }
   if (!moving.empty())
     throw std::runtime_error("the arm moves: " + moving +
                              "let it hang without pressure (softarm disarm) until it is still, and "
-                             "see that no plate is loose");
+                             "check that no marker is loose");
 }
 
 std::vector<Eigen::Isometry3d> means(const std::vector<std::vector<TimedPose>>& poses, bool fixed,
@@ -163,7 +146,7 @@ std::vector<Eigen::Isometry3d> means(const std::vector<std::vector<TimedPose>>& 
 
 std::string bodies_text(const RestCalibration& found) {
   std::string text = fmt::format("{:<12}{:>7}{:>22}{:>26}{:>24}\n", "body", "frames",
-                                 "spread an axis", "error of the mean", "strays at most");
+                                 "spread an axis", "error of the mean", "largest deviation");
   for (std::size_t i = 0; i < found.body.size(); ++i) {
     const PoseStatistics& body = found.body[i];
     if (body.frames == 0) continue;
@@ -179,13 +162,14 @@ std::string bodies_text(const RestCalibration& found) {
 
 std::string plates_text(const BodySettings& before, const RestCalibration& found) {
   std::string text =
-      "\nplates: where S_i sits on its body, and how far that is from what was configured\n";
+      "\nmarker frames: pose of S_i on its body, and the distance from the configured one\n";
   for (std::size_t i = before.base_id < 0 ? 1 : 0; i < found.body.size(); ++i) {
-    const PlateSettings& now =
+    const MarkerFrameSettings& now =
         i == 0 ? found.bodies.base_plate : found.bodies.segment_plates[i - 1];
-    PlateSettings was = before.base_plate;
+    MarkerFrameSettings was = before.base_plate;
     if (i > 0)
-      was = i <= before.segment_plates.size() ? before.segment_plates[i - 1] : PlateSettings{};
+      was =
+          i <= before.segment_plates.size() ? before.segment_plates[i - 1] : MarkerFrameSettings{};
     const Eigen::Isometry3d from = pose_of(was).inverse() * pose_of(now);
     const Eigen::Vector3d mm = 1e3 * now.position_m, mrad = 1e3 * now.rotation_rad;
     text += fmt::format(
@@ -212,36 +196,11 @@ std::string readings_text(const RestCalibration& found) {
                                     1e3 * found.rest_u_rad[k + 1]),
                         reading(found.before[i]), reading(found.after[i]));
   }
-  return text + "(after: the second half of the frames, with plates that the first half gave)\n";
+  return text +
+         "(after: the second half of the frames, with the marker frames from the first half)\n";
 }
 
 }  // namespace
-
-Eigen::VectorXd rest_shape(const ArmParameters& arm) {
-  constexpr double kStep_rad = 1e-6, kExact_nm = 1e-12;
-  DynamicsWorkspace workspace(arm);
-  Eigen::VectorXd u = Eigen::VectorXd::Zero(arm.dof());
-  for (int iteration = 0; iteration < 50; ++iteration) {
-    const Eigen::VectorXd residual = moments(arm, workspace, u);
-    if (residual.cwiseAbs().maxCoeff() < kExact_nm) return u;
-    Eigen::MatrixXd slope(u.size(), u.size());
-    for (Eigen::Index j = 0; j < u.size(); ++j) {
-      Eigen::VectorXd up = u, down = u;
-      up[j] += kStep_rad;
-      down[j] -= kStep_rad;
-      slope.col(j) =
-          (moments(arm, workspace, up) - moments(arm, workspace, down)) / (2.0 * kStep_rad);
-    }
-    const Eigen::VectorXd step = slope.fullPivLu().solve(residual);
-    u -= step;
-    if (!u.allFinite()) break;
-    if (step.cwiseAbs().maxCoeff() < 1e-12) return u;
-  }
-  throw std::runtime_error(
-      "the model has no shape at rest near straight: expected stiffness that holds the arm's "
-      "weight "
-      "(arm.stiffness_nm_per_rad, arm.mass_kg, arm.base.rotation)");
-}
 
 RestCalibration calibrate_rest(const Experiment& experiment, const std::vector<MocapFrame>& frames,
                                BaseSource base) {
@@ -253,7 +212,7 @@ RestCalibration calibrate_rest(const Experiment& experiment, const std::vector<M
   for (std::size_t i = fixed ? 1 : 0; i < poses.size(); ++i)
     out.body[i] = pose_statistics(poses[i]);
   expect_still(out.body);
-  out.rest_u_rad = rest_shape(experiment.arm);
+  out.rest_u_rad = hanging_shape(experiment.arm);
   const auto all = means(poses, fixed, 0, count);
   const auto first = means(poses, fixed, 0, count / 2);
   const auto second = means(poses, fixed, count / 2, count - count / 2);
@@ -277,22 +236,20 @@ std::string calibration_text(const Experiment& experiment, const RestCalibration
       bodies_text(found) + plates_text(experiment.transport.bodies, found) + readings_text(found);
   if (experiment.transport.bodies.base_id >= 0)
     text += fmt::format(
-        "\nthe arm's axis at the base was {:.2f} mrad from arm.base.rotation, which tells the "
-        "model "
-        "where down is; --base arm trusts that instead\n",
+        "\nthe arm's axis at the base was {:.2f} mrad from arm.base.rotation, which "
+        "gives the model the direction of gravity; --base arm uses that instead\n",
         1e3 * found.base_tilt_rad);
   text +=
-      "not told by a still arm: where the base itself is and which way it is turned about the "
-      "arm's "
-      "axis (so the direction phi = 0), and lengths: what is wrong with them is now in the "
-      "plates\n";
+      "not determined by an arm at rest: the position of the base, its rotation about the arm's "
+      "axis "
+      "(so the direction phi = 0), and lengths: their errors are now part of the marker frames\n";
   return text;
 }
 
 std::string calibrated_yaml(const Experiment& experiment, const RestCalibration& found,
                             const std::string& note, const std::string& config) {
-  const bool named = experiment.transport.mocap.source == MocapSourceKind::rigid_transform;
-  const auto plate = [&](const PlateSettings& each) {
+  const bool named = experiment.transport.mocap.source.channel_per_body;
+  const auto plate = [&](const MarkerFrameSettings& each) {
     const Eigen::Vector3d &p = each.position_m, &r = each.rotation_rad;
     return fmt::format(
         "{{{}position_m: [{:.9f}, {:.9f}, {:.9f}], rotation_rad: [{:.9f}, {:.9f}, {:.9f}]}}",
@@ -303,7 +260,7 @@ std::string calibrated_yaml(const Experiment& experiment, const RestCalibration&
   if (found.bodies.base_id >= 0)
     text += fmt::format("    base_plate: {}\n", plate(found.bodies.base_plate));
   text += "    segment_plates:\n";
-  for (const PlateSettings& each : found.bodies.segment_plates)
+  for (const MarkerFrameSettings& each : found.bodies.segment_plates)
     text += fmt::format("      - {}\n", plate(each));
   return text;
 }

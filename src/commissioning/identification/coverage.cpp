@@ -37,7 +37,7 @@ CoverageTable study_coverage(const Experiment& experiment, const StepPlan& plan,
                              const FitChoice& choice, const CoverageStudy& study,
                              const std::function<void(int done)>& progress,
                              const std::function<bool()>& stop) {
-  const ParameterSet set(believed(experiment), experiment.actuation.kind, choice);
+  const ParameterSet set(configured(experiment), experiment.actuation.kind, choice);
   std::vector<Trial> trials(static_cast<std::size_t>(study.seeds));
   CoverageTable table;
   std::mutex telling;

@@ -33,14 +33,14 @@ std::string list(int count, const Value& value) {
   return text + "]";
 }
 
-/// Chambers as they push.
+/// The chambers with the angles and gains of the input map.
 std::string chambers_yaml(const ArmHypothesis& arm, const char* indent) {
   std::string text;
   for (int i = 0; i < arm.arm.size(); ++i) {
     std::vector<double> angles, gains;
     for (std::size_t j = 0; j < arm.segment_of.size(); ++j) {
       if (arm.segment_of[j] != i) continue;
-      const Eigen::Vector2d push = -arm.push.col(static_cast<Eigen::Index>(j));
+      const Eigen::Vector2d push = -arm.input_map.col(static_cast<Eigen::Index>(j));
       gains.push_back(std::max(1e-9, push.norm()));
       double angle = std::atan2(push.y(), push.x());
       if (angle < -1e-12) angle += 2.0 * std::numbers::pi;
@@ -98,11 +98,11 @@ std::string conditioning_text(const ParameterSet& set, const Refinement& fit) {
   if (kept > 0)
     text += fmt::format(
         "singular values {:.3g} to {:.3g} (1 over one is the standard error of its combination); "
-        "told least: {}\n",
+        "least determined: {}\n",
         fit.singular_values[0], fit.singular_values[kept - 1],
         combination_text(set, fit.combinations.col(kept - 1)));
   for (Eigen::Index i = kept; i < set.size(); ++i)
-    text += fmt::format("not told by this record, left as configured: {}\n",
+    text += fmt::format("not determined by this record, left as configured: {}\n",
                         combination_text(set, fit.combinations.col(i)));
   return text;
 }
@@ -135,7 +135,7 @@ std::string identified_yaml(const Experiment& experiment, const ArmHypothesis& a
   text += fmt::format(
       "\nidentification:\n  lag_s: {:.6g}\n  delay_s: {:.6g}\n  cubic_nm_per_rad3: {:.6g}\n"
       "  rest_u_rad: [",
-      arm.lag_s, arm.delay_s, arm.cubic_nm_per_rad3);
+      arm.lag_s, arm.dead_time_s, arm.cubic_nm_per_rad3);
   for (Eigen::Index i = 0; i < arm.arm.size(); ++i)
     text += fmt::format("{}[{:.6g}, {:.6g}]", i > 0 ? ", " : "", arm.rest_rad[2 * i],
                         arm.rest_rad[2 * i + 1]);

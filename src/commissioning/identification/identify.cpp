@@ -6,7 +6,7 @@
 namespace softarm {
 namespace {
 
-/// RMS of what an arm leaves over, infinite where it has no bounded response.
+/// RMS of the residual of an arm, infinite if it has no bounded response.
 double distance_rad(const ParameterSet& set, const MotionRecord& record, const Eigen::VectorXd& x) {
   try {
     return predict(set, record, x).rms_rad;
@@ -19,12 +19,12 @@ double distance_rad(const ParameterSet& set, const MotionRecord& record, const E
 
 Refinement identify(const ParameterSet& set, const MotionRecord& record,
                     const IdentifyOptions& options) {
-  const Eigen::VectorXd believed = set.believed();
+  const Eigen::VectorXd configured = set.configured();
   const LinearFit start =
-      fit_linear_and_lag(set, record, believed, options.window_s, options.longest_lag_s);
-  // Noise and smoothing may make nonsense of a motion that tells little: what comes nearest.
-  Eigen::VectorXd nearest = believed;
-  double least_rad = distance_rad(set, record, believed);
+      fit_linear_and_lag(set, record, configured, options.window_s, options.longest_lag_s);
+  // With noise and smoothing, a motion with little information may give nonsense: take the nearest.
+  Eigen::VectorXd nearest = configured;
+  double least_rad = distance_rad(set, record, configured);
   const auto consider = [&](const Eigen::VectorXd& x) {
     const double distance = distance_rad(set, record, x);
     if (distance >= least_rad) return;

@@ -7,11 +7,15 @@
 #include <cmath>
 #include <numbers>
 #include <stdexcept>
+#include <utility>
+
+#include "commissioning/median.hpp"
 
 namespace softarm {
 namespace {
 
-constexpr double kRidge = 1e-6;  ///< of the mean information: holds what the motion does not tell
+constexpr double kRidge =
+    1e-6;  ///< of the mean information: keeps what the motion does not determine
 
 /// A Hann window and its first two derivatives, sampled; each sums to what it does to 1, t, t^2
 /// / 2.
@@ -40,7 +44,7 @@ struct SmoothingKernel {
   Eigen::Index half() const { return value.size() / 2; }
 };
 
-/// The record on an even grid, as motion and its derivatives at every half window.
+/// The record on an even grid: the motion and its derivatives at every half window.
 struct SmoothMotion {
   std::vector<Eigen::VectorXd> u, velocity, acceleration, input;
 };
@@ -62,12 +66,10 @@ double typical_period_s(const MotionRecord& record) {
   std::vector<double> gaps;
   for (Eigen::Index k = 1; k < record.time_s.size(); ++k)
     gaps.push_back(record.time_s[k] - record.time_s[k - 1]);
-  std::nth_element(gaps.begin(), gaps.begin() + static_cast<std::ptrdiff_t>(gaps.size() / 2),
-                   gaps.end());
-  return gaps[gaps.size() / 2];
+  return median(std::move(gaps));
 }
 
-SmoothMotion smooth(const MotionRecord& record, double window_s, double lag_s, double delay_s) {
+SmoothMotion smooth(const MotionRecord& record, double window_s, double lag_s, double dead_time_s) {
   if (record.time_s.size() < 8)
     throw std::runtime_error(fmt::format("a record of {} frames is too short: expected at least 8",
                                          record.time_s.size()));
@@ -76,7 +78,7 @@ SmoothMotion smooth(const MotionRecord& record, double window_s, double lag_s, d
   const auto count = static_cast<Eigen::Index>(std::floor(span_s / period_s + 0.5)) + 1;
   const Eigen::MatrixXd u = evenly(record, period_s, count);
   Eigen::MatrixXd input(count, record.input.value.cols());
-  LaggedInput lagged(record.input, lag_s, delay_s);
+  LaggedInput lagged(record.input, lag_s, dead_time_s);
   Eigen::VectorXd p(input.cols());
   for (Eigen::Index k = 0; k < count; ++k) {
     lagged.at(record.time_s[0] + static_cast<double>(k) * period_s, p);
@@ -96,7 +98,7 @@ SmoothMotion smooth(const MotionRecord& record, double window_s, double lag_s, d
   return out;
 }
 
-/// What (16) leaves over, every instant below the other: B u'' + C u' + G + D u' + springs - push.
+/// The residual of (16), instants stacked: B u'' + C u' + G + D u' + springs - input.
 Eigen::VectorXd leftover(const ArmHypothesis& arm, const SmoothMotion& motion) {
   const Eigen::Index dof = arm.arm.dof();
   DynamicsWorkspace workspace(arm.arm);
@@ -120,7 +122,7 @@ Eigen::VectorXd leftover(const ArmHypothesis& arm, const SmoothMotion& motion) {
 LinearFit fit_linear(const ParameterSet& set, const MotionRecord& record,
                      const Eigen::VectorXd& start, double window_s) {
   ArmHypothesis arm = set.arm(start);
-  const SmoothMotion motion = smooth(record, window_s, arm.lag_s, arm.delay_s);
+  const SmoothMotion motion = smooth(record, window_s, arm.lag_s, arm.dead_time_s);
   const Eigen::VectorXd before = leftover(arm, motion);
   if (before.size() < 4 * set.size())
     throw std::runtime_error(
@@ -137,7 +139,8 @@ LinearFit fit_linear(const ParameterSet& set, const MotionRecord& record,
   }
   Eigen::MatrixXd information = X.transpose() * X;
   const double typical = information.trace() / static_cast<double>(X.cols());
-  if (!(typical > 1e-12)) throw std::runtime_error("the arm does not move: nothing can be told");
+  if (!(typical > 1e-12))
+    throw std::runtime_error("the arm does not move: nothing can be identified");
   information.diagonal().array() += kRidge * typical;
   const Eigen::LDLT<Eigen::MatrixXd> ldlt(information);
   const Eigen::VectorXd change = ldlt.solve(-X.transpose() * before);
@@ -174,7 +177,7 @@ LinearFit fit_linear_and_lag(const ParameterSet& set, const MotionRecord& record
       Eigen::VectorXd tried = start;
       tried[i] = lag_s / set[i].scale;
       const LinearFit fit = fit_linear(set, record, tried, window_s);
-      // With other gains the same moments: what is left over counts against them.
+      // Other gains give the same moments: the residual is relative to them.
       if (fit.residual_rms_nm / fit.moment_rms_nm < best.residual_rms_nm / best.moment_rms_nm)
         best = fit;
     }

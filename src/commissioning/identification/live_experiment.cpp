@@ -5,14 +5,13 @@
 #include <algorithm>
 #include <stdexcept>
 
-#include "softarm/base/clock.hpp"
-#include "softarm/client/arm_listener.hpp"
-#include "softarm/client/commander.hpp"
+#include "commissioning/guarded_motion.hpp"
+#include "softarm/transport/mocap_source.hpp"
 
 namespace softarm {
 namespace {
 
-constexpr std::int64_t kListen_ns = 500'000'000;      ///< for others, before the first command
+constexpr double kListen_s = 0.5;                     ///< for others, before the first command
 constexpr std::int64_t kPatience_ns = 5'000'000'000;  ///< for frames, and for the arm to rest
 constexpr std::int64_t kLost_ns = 200'000'000;        ///< without a frame: the arm is not seen
 constexpr std::int64_t kStill_ns = 500'000'000;       ///< so long at rest before the first step
@@ -23,106 +22,84 @@ struct Sample {
   Eigen::VectorXd value;
 };
 
-double seconds(std::int64_t time_ns) { return 1e-9 * static_cast<double>(time_ns); }
-
 class LiveExperiment {
  public:
   LiveExperiment(const Experiment& experiment, const std::function<bool()>& stop,
                  const std::function<void(const std::string&)>& progress)
-      : experiment_(experiment),
-        node_(experiment.transport.lcm.url),
-        commander_(experiment, node_),
-        listener_(experiment, node_, false),
-        stop_(stop),
-        progress_(progress) {}
+      : client_(experiment), stop_(stop), progress_(progress), motion_(client_, kLost_ns, stop) {
+    client_.lock_commands();
+  }
 
   LiveOutcome run(const std::vector<std::vector<double>>& steps, double hold_s) {
     listen();
-    std::string why;
-    try {
-      wait_for_rest();
-      const std::int64_t start_ns = monotonic_now_ns();
-      const auto hold_ns = static_cast<std::int64_t>(1e9 * hold_s);
-      for (std::size_t k = 0; k < steps.size() && why.empty(); ++k) {
-        if (progress_) progress_(fmt::format("step {} of {}", k + 1, steps.size()));
-        why = play(steps[k], start_ns + static_cast<std::int64_t>(k + 1) * hold_ns);
-      }
-    } catch (...) {
-      commander_.vent_to_rest();
-      throw;
+    wait_for_rest();
+    client_.on_frame([this](const CapturedFrame&) { note_frame(); });
+    const std::int64_t start_ns = noted_ns_ = client_.now_ns();
+    for (std::size_t k = 0; k < steps.size() && motion_.aborted().empty(); ++k) {
+      if (progress_) progress_(fmt::format("step {} of {}", k + 1, steps.size()));
+      play(steps[k], start_ns + static_cast<std::int64_t>(k + 1) * to_ns(hold_s));
     }
-    commander_.vent_to_rest();
-    return {record(), why};
+    client_.on_frame({});
+    client_.vent_to_rest();
+    return {record(), motion_.aborted()};
   }
 
  private:
   bool stop_requested() const { return stop_ && stop_(); }
 
   void listen() {
-    const std::int64_t end_ns = monotonic_now_ns() + kListen_ns;
-    while (monotonic_now_ns() < end_ns && !stop_requested()) attend(end_ns);
-    if (const std::string other = listener_.other_commander(); !other.empty())
+    client_.wait_for([this] { return stop_requested(); }, kListen_s);
+    if (const std::string other = client_.other_commander(); !other.empty())
       throw std::runtime_error(other);
-    listener_.commanding();
   }
 
-  /// With zeros meanwhile: whoever holds the valves gets to know us, and the arm hangs.
+  /// Commands zeros meanwhile: the valve driver accepts us as the sender, and the arm hangs.
   void wait_for_rest() {
-    const std::int64_t start_ns = monotonic_now_ns();
+    const std::int64_t start_ns = client_.now_ns();
     std::int64_t moved_ns = start_ns;
     const auto seen = [&] {
-      return listener_.whole_frame_ns() > std::max(start_ns, monotonic_now_ns() - kLost_ns);
+      return client_.seen().arrival_ns > std::max(start_ns, client_.now_ns() - kLost_ns);
     };
     for (std::int64_t now_ns = start_ns; now_ns < start_ns + kPatience_ns;
-         now_ns = monotonic_now_ns()) {
+         now_ns = client_.now_ns()) {
       if (stop_requested()) throw std::runtime_error("stopped before the first step");
-      if (!seen() || listener_.fastest_radps() > kStill_radps) moved_ns = now_ns;
+      if (!seen() || client_.seen().speed_radps > kStill_radps) moved_ns = now_ns;
       if (now_ns - moved_ns > kStill_ns) return;
-      commander_.vent(now_ns);
-      attend(commander_.next_ns());
+      client_.vent();
+      client_.update(client_.next_command_ns());
     }
     if (!seen())
       throw std::runtime_error(fmt::format(
           "no frame with every segment on {} for {} s: is motion capture running, and do "
           "daemon.bodies name its bodies?",
-          listener_.seen().channels.front(), kPatience_ns / 1'000'000'000));
+          mocap_channels(client_.experiment().transport).front(), kPatience_ns / 1'000'000'000));
     throw std::runtime_error(
         "the arm moves before the first step: expected it at rest; is another controller "
         "commanding it?");
   }
 
-  /// One set point until `until_ns`; returns why the arm must be vented, or nothing.
-  std::string play(const std::vector<double>& bar, std::int64_t until_ns) {
+  /// One set point until `until_ns`.
+  void play(const std::vector<double>& bar, std::int64_t until_ns) {
     const PressureVector wanted_bar =
         Eigen::Map<const Eigen::VectorXd>(bar.data(), std::ssize(bar));
-    for (std::int64_t now_ns = monotonic_now_ns(); now_ns < until_ns; now_ns = monotonic_now_ns()) {
-      if (stop_requested()) return "stopped";
-      if (commander_.held_up()) return Commander::kHeldUp;
-      if (std::string why = listener_.beyond_limits(kLost_ns); !why.empty()) return why;
-      const std::int64_t due_ns = commander_.next_ns();
-      commander_.update(wanted_bar, experiment_.actuation.slew_bar_per_s, now_ns);
-      if (commander_.next_ns() != due_ns) note_input(now_ns);
-      attend(std::min(until_ns, commander_.next_ns()));
-      note_frame();
-    }
-    return {};
+    const double slew_bar_per_s = client_.experiment().actuation.slew_bar_per_s;
+    motion_.command(wanted_bar, slew_bar_per_s, [&] {
+      note_input();
+      return client_.now_ns() >= until_ns;
+    });
   }
 
-  /// Handles one message at most.
-  void attend(std::int64_t until_ns) {
-    node_.wait_until(until_ns);
-    listener_.look_at_clock();
-  }
-
-  void note_input(std::int64_t now_ns) {
-    if (inputs_.empty() || inputs_.back().value != commander_.sent_bar())
-      inputs_.push_back({now_ns, commander_.sent_bar()});
+  void note_input() {
+    if (client_.sent_ns() <= noted_ns_) return;
+    noted_ns_ = client_.sent_ns();
+    if (inputs_.empty() || inputs_.back().value != client_.set_points_bar())
+      inputs_.push_back({noted_ns_, client_.set_points_bar()});
   }
 
   void note_frame() {
-    const std::int64_t captured_ns = listener_.captured_ns();
-    if (frames_.empty() || captured_ns > frames_.back().time_ns)
-      frames_.push_back({captured_ns, listener_.u_rad()});
+    const SeenArm& seen = client_.seen();
+    if (frames_.empty() || seen.capture_ns > frames_.back().time_ns)
+      frames_.push_back({seen.capture_ns, seen.u_rad});
   }
 
   MotionRecord record() const {
@@ -136,7 +113,7 @@ class LiveExperiment {
       value.resize(rows, from.front().value.size());
       for (Eigen::Index k = 0; k < rows; ++k) {
         const Sample& sample = from[static_cast<std::size_t>(k)];
-        time_s[k] = seconds(sample.time_ns - zero_ns);
+        time_s[k] = to_seconds(sample.time_ns - zero_ns);
         value.row(k) = sample.value;
       }
     };
@@ -149,12 +126,11 @@ class LiveExperiment {
     return out;
   }
 
-  const Experiment& experiment_;
-  LcmNode node_;
-  Commander commander_;
-  ArmListener listener_;
+  ArmClient client_;
   const std::function<bool()>& stop_;
   const std::function<void(const std::string&)>& progress_;
+  GuardedMotion motion_;
+  std::int64_t noted_ns_ = 0;  ///< the newest command sent that is among the inputs
   std::vector<Sample> frames_, inputs_;
 };
 

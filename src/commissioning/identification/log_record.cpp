@@ -3,11 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <lcm/lcm-cpp.hpp>
 #include <stdexcept>
 #include <vector>
 
+#include "softarm/base/time.hpp"
 #include "softarm/estimation/curvature_estimator.hpp"
+#include "softarm/transport/event_log.hpp"
 #include "softarm/transport/message_decoding.hpp"
 #include "softarm/transport/mocap_source.hpp"
 #include "softarm/transport/settings.hpp"
@@ -52,26 +53,30 @@ class LogReader {
     chambers_ = static_cast<std::size_t>(chamber_count(experiment.actuation));
   }
 
-  void take(const lcm::LogEvent& event) {
+  void take(const LogEvent& event) {
     const LcmSettings& lcm = experiment_.transport.lcm;
-    const std::span bytes(static_cast<const std::byte*>(event.data),
-                          static_cast<std::size_t>(event.datalen));
-    if (const auto channel = mocap_.find(event.channel))
-      take_frame(*channel, bytes, event.timestamp);
-    if (input_ == LoggedInput::commanded && event.channel == lcm.command_channel &&
-        decode(bytes, command_message_))
-      take_pressures(event.timestamp, command_message_.pressure_bar);
-    if (input_ == LoggedInput::measured && event.channel == lcm.measurement_channel &&
-        decode(bytes, measurement_message_))
-      take_pressures(event.timestamp, measurement_message_.pressure_bar);
+    const auto channel = mocap_.find(event.channel);
+    const bool input =
+        event.channel ==
+        (input_ == LoggedInput::commanded ? lcm.command_channel : lcm.measurement_channel);
+    if (!channel && !input) return;
+    const auto arrival_ns = event.arrival_ns();
+    const bool used =
+        arrival_ns && (channel ? take_frame(*channel, event.data, *arrival_ns)
+                       : input_ == LoggedInput::commanded
+                           ? take_pressures(event.data, command_message_, *arrival_ns)
+                           : take_pressures(event.data, measurement_message_, *arrival_ns));
+    if (!used) ++malformed_;
   }
+  /// Messages on our channels that could not be decoded.
+  std::int64_t malformed() const { return malformed_; }
 
   MotionRecord record(const std::string& path) const {
     const LcmSettings& lcm = experiment_.transport.lcm;
     if (frames_.time_s.size() < kFewest)
       throw std::runtime_error(
           fmt::format("{}: expected at least {} frames with every segment on {}, got {}; "
-                      "daemon.lcm.mocap_channel and daemon.bodies say where to look",
+                      "see daemon.lcm.mocap_channel and daemon.bodies",
                       path, kFewest, mocap_.channels().front(), frames_.time_s.size()));
     if (inputs_.time_s.size() < 2)
       throw std::runtime_error(fmt::format(
@@ -90,31 +95,39 @@ class LogReader {
   }
 
  private:
-  double time_s(std::int64_t time_us) {
-    if (start_us_ < 0) start_us_ = time_us;
-    return 1e-6 * static_cast<double>(time_us - start_us_);
+  double time_s(std::int64_t time_ns) {
+    if (start_us_ < 0) start_us_ = time_ns / 1000;
+    return 1e-6 * static_cast<double>(time_ns / 1000 - start_us_);
   }
 
-  void take_frame(std::size_t channel, std::span<const std::byte> bytes, std::int64_t arrival_us) {
-    arrival_ns_ = std::max(arrival_ns_, arrival_us * 1000);
-    if (mocap_.take(channel, bytes, arrival_ns_, frame_) != MocapReceipt::frame) return;
-    if (frame_.frame_number == last_frame_) return;
+  /// False if the message could not be decoded.
+  bool take_frame(std::size_t channel, std::span<const std::byte> bytes, std::int64_t arrival_ns) {
+    arrival_ns_ = std::max(arrival_ns_, arrival_ns);
+    const MocapReceipt receipt = mocap_.take(channel, bytes, arrival_ns_, frame_);
+    if (receipt == MocapReceipt::frame && frame_.frame_number != last_frame_) add_frame();
+    return receipt != MocapReceipt::malformed;
+  }
+
+  void add_frame() {
     last_frame_ = frame_.frame_number;
     estimator_.estimate(frame_, estimate_);
     if (!std::all_of(estimate_.valid.begin(), estimate_.valid.begin() + experiment_.arm.size(),
                      [](bool each) { return each; }))
       return;
     const Eigen::VectorXd u = estimate_.u_rad;
-    frames_.add(time_s(frame_.capture_ns / 1000), u.data(), static_cast<std::size_t>(u.size()));
+    frames_.add(time_s(frame_.capture_ns), u.data(), static_cast<std::size_t>(u.size()));
   }
 
-  void take_pressures(std::int64_t arrival_us, const std::vector<float>& pressures) {
-    if (pressures.size() != chambers_) {
+  template <class Message>
+  bool take_pressures(std::span<const std::byte> bytes, Message& message, std::int64_t arrival_ns) {
+    if (!decode(bytes, message)) return false;
+    if (message.pressure_bar.size() != chambers_) {
       ++wrong_size_;
-      return;
+      return true;
     }
-    const std::vector<double> row(pressures.begin(), pressures.end());
-    inputs_.add(time_s(arrival_us), row.data(), row.size());
+    const std::vector<double> row(message.pressure_bar.begin(), message.pressure_bar.end());
+    inputs_.add(time_s(arrival_ns), row.data(), row.size());
+    return true;
   }
 
   const Experiment& experiment_;
@@ -124,8 +137,8 @@ class LogReader {
   std::size_t chambers_ = 0;
   Samples frames_, inputs_;
   std::int64_t start_us_ = -1, arrival_ns_ = 0;
-  std::int64_t last_frame_ = INT64_MIN;
-  std::int64_t wrong_size_ = 0;
+  std::int64_t last_frame_ = kNever;
+  std::int64_t wrong_size_ = 0, malformed_ = 0;
   MocapFrame frame_;
   CurvatureEstimate estimate_;
   softarm_messages::pressure_command_t command_message_;
@@ -134,17 +147,19 @@ class LogReader {
 
 }  // namespace
 
-MotionRecord read_log(const Experiment& experiment, const std::filesystem::path& log,
+LoggedMotion read_log(const Experiment& experiment, const std::filesystem::path& log,
                       LoggedInput input) {
   if (experiment.actuation.kind == ActuationKind::torque)
     throw std::runtime_error("a log holds pressures; expected actuation by chambers");
-  lcm::LogFile file(log.string(), "r");
-  if (!file.good())
-    throw std::runtime_error(fmt::format(
-        "cannot read {}: is it an LCM log (softarm import, lcm-logger)?", log.string()));
+  EventLogReader events(log);
   LogReader reader(experiment, input);
-  while (const lcm::LogEvent* event = file.readNextEvent()) reader.take(*event);
-  return reader.record(log.string());
+  for (LogEvent event; events.next(event);) reader.take(event);
+  std::string damage = events.damage_text();
+  if (reader.malformed() > 0)
+    damage +=
+        fmt::format("{}{} messages on our channels could not be decoded, or have no valid time",
+                    damage.empty() ? "" : "; ", reader.malformed());
+  return {reader.record(log.string()), damage};
 }
 
 }  // namespace softarm

@@ -87,29 +87,29 @@ ModelComparison compare_models(const Experiment& experiment, const MotionRecord&
                                const FitChoice& choice, const IdentifyOptions& options,
                                const std::function<void(const std::string&)>& progress) {
   ModelComparison out;
-  IdentifyOptions told = options;
-  told.refinement.weighted = false;
-  told.refinement.most_rounds = kMostRounds;
+  IdentifyOptions unweighted = options;
+  unweighted.refinement.weighted = false;
+  unweighted.refinement.most_rounds = kMostRounds;
   for (const Named& variant : variants(choice)) {
     if (progress) {
       progress(variant.name);
-      told.refinement.progress = [&](const std::string& text) {
+      unweighted.refinement.progress = [&](const std::string& text) {
         progress(fmt::format("{}: {}", variant.name, text));
       };
     }
-    ArmHypothesis start = believed(experiment);
+    ArmHypothesis start = configured(experiment);
     if (!variant.choice.damping && !variant.choice.inertia)
       for (SegmentParameters& segment : start.arm.segments)
         segment.damping_nms_per_rad = kUndamped_s * segment.stiffness_nm_per_rad;
     const ParameterSet set(start, experiment.actuation.kind, variant.choice);
-    // What has a term more begins with the simplest of its kind: more terms are never worse.
+    // A model with more terms starts from the simplest of its kind, so that it is never worse.
     const CrossValidation* simpler = nullptr;
     for (const ModelTrial& trial : out.trials)
       if (trial.damping == variant.choice.damping) {
         simpler = &trial.result;
         break;
       }
-    CrossValidation result = cross_validate(set, record, told, simpler);
+    CrossValidation result = cross_validate(set, record, unweighted, simpler);
     out.trials.push_back({variant.name, variant.choice.damping, set.size(), std::move(result)});
     out.motion_rad = out.trials.back().result.whole.motion_rms_rad;
   }

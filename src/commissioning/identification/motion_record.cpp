@@ -28,10 +28,10 @@ MotionRecord MotionRecord::thinned(double apart_s) const {
   return out;
 }
 
-LaggedInput::LaggedInput(const InputTrack& track, double lag_s, double delay_s)
+LaggedInput::LaggedInput(const InputTrack& track, double lag_s, double dead_time_s)
     : track_(track),
       lag_s_(lag_s),
-      delay_s_(delay_s),
+      dead_time_s_(dead_time_s),
       now_s_(track.time_s[0]),
       state_(track.value.row(0)) {}
 
@@ -54,7 +54,7 @@ void LaggedInput::advance(double t_s) {
 }
 
 void LaggedInput::at(double t_s, Eigen::Ref<Eigen::VectorXd> out, bool before) {
-  const double t = t_s - delay_s_;
+  const double t = t_s - dead_time_s_;
   const Eigen::Index count = track_.time_s.size();
   while (index_ + 1 < count &&
          (before ? track_.time_s[index_ + 1] < t : track_.time_s[index_ + 1] <= t)) {

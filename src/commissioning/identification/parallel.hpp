@@ -10,8 +10,8 @@
 
 namespace softarm {
 
-/// Calls work(0) .. work(count - 1), each once, on at most `threads` threads, this one among them.
-/// The first exception is thrown again here when all have ended.
+/// Calls work(0) .. work(count - 1), each once, on at most `threads` threads including this one.
+/// Rethrows the first exception when all have ended.
 template <class Work>
 void in_parallel(int count, int threads, const Work& work) {
   std::atomic<int> next = 0;

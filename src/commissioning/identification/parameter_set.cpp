@@ -11,7 +11,7 @@ namespace {
 constexpr double kLeast = 1e-3;       ///< stiffness of an arm that has any, of that configured
 constexpr double kShortest_s = 1e-3;  ///< beta / k of an arm without inertia
 constexpr double kJagged_s = 0.02;
-constexpr double kSlow_s = 0.5;       ///< at least of that order are the times of slow motion
+constexpr double kSlow_s = 0.5;       ///< scale of lag and delay in quasi-static motion
 constexpr double kHardens_rad = 0.2;  ///< a cubic stiffness of its scale doubles k at that bend
 constexpr double kLagScale_s = 0.1, kDelayScale_s = 0.05, kRestScale_rad = 0.1;
 
@@ -37,7 +37,7 @@ ParameterSet::ParameterSet(const ArmHypothesis& start, ActuationKind kind, const
   add_impedance(choice);
   if (choice.gains_free && kind == ActuationKind::chambers) {
     add_gains(choice);
-    if (choice.directions) start_.push.setZero();
+    if (choice.directions) start_.input_map.setZero();
   }
   add_times(choice);
 }
@@ -98,18 +98,18 @@ void ParameterSet::add_gains(const FitChoice& choice) {
             ? fmt::format(", segment {}", g + 1)
             : fmt::format(", segment {} chamber {}", start_.segment_of[first] + 1, side[first] + 1);
     // Chambers that share a gain keep their ratios.
-    const double scale = start_.push.col(members.front()).norm();
+    const double scale = start_.input_map.col(members.front()).norm();
     const auto add = [&](const char* name, Eigen::Vector2d (*axis)(const Eigen::Vector2d&)) {
       parameters_.push_back(
           {name + which, "N m/bar", scale,
-           [=, reference = start_.push](const ArmHypothesis& arm) {
-             return axis(reference.col(members.front())).dot(arm.push.col(members.front()));
+           [=, reference = start_.input_map](const ArmHypothesis& arm) {
+             return axis(reference.col(members.front())).dot(arm.input_map.col(members.front()));
            },
-           [=, reference = start_.push](ArmHypothesis& arm, double value) {
+           [=, reference = start_.input_map](ArmHypothesis& arm, double value) {
              for (const Eigen::Index j : members) {
                const Eigen::Vector2d direction = axis(reference.col(j));
-               arm.push.col(j) +=
-                   (value / scale * reference.col(j).norm() - direction.dot(arm.push.col(j))) *
+               arm.input_map.col(j) +=
+                   (value / scale * reference.col(j).norm() - direction.dot(arm.input_map.col(j))) *
                    direction;
              }
            },
@@ -141,9 +141,10 @@ void ParameterSet::add_times(const FitChoice& choice) {
     number("lag", "s", std::max(start_.lag_s, choice.inertia ? kLagScale_s : kSlow_s),
            &ArmHypothesis::lag_s, 0.0);
   if (choice.delay)
-    number("delay", "s", std::max(start_.delay_s, choice.inertia ? kDelayScale_s : kSlow_s),
-           &ArmHypothesis::delay_s, kUnbounded);
-  // Recorded inputs are jagged: what a delay does is told over more than one of their steps.
+    number("delay", "s", std::max(start_.dead_time_s, choice.inertia ? kDelayScale_s : kSlow_s),
+           &ArmHypothesis::dead_time_s, kUnbounded);
+  // Recorded inputs are jagged: the effect of a delay needs a difference over several of their
+  // steps.
   if (choice.delay && !choice.inertia)
     parameters_.back().difference = kJagged_s / parameters_.back().scale;
 }

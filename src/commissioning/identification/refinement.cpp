@@ -15,7 +15,7 @@
 namespace softarm {
 namespace {
 
-constexpr double kHeldAbove = 1.0;        ///< standard error of a combination that is not told
+constexpr double kHeldAbove = 1.0;  ///< standard error of a combination that is not determined
 constexpr double kNoiseFloor_rad = 1e-9;  ///< no motion capture is better
 constexpr int kWeightings = 3;
 constexpr double kSame = 1e-4;         ///< squared standard errors: a hundredth of one
@@ -122,7 +122,7 @@ class Search {
  public:
   Search(const Comparison& comparison, const ParameterSet& set, const RefinementOptions& options)
       : comparison_(comparison),
-        believed_(set.believed()),
+        configured_(set.configured()),
         lowest_(set.lowest()),
         options_(options),
         measured_(comparison.measured()) {}
@@ -149,12 +149,12 @@ class Search {
  private:
   double cost(const Eigen::MatrixXd& u, const Eigen::VectorXd& x) const {
     const double prior = options_.prior > 0.0
-                             ? (x - believed_).squaredNorm() / (options_.prior * options_.prior)
+                             ? (x - configured_).squaredNorm() / (options_.prior * options_.prior)
                              : 0.0;
     return (whiten_ * (measured_ - u)).squaredNorm() / inflation_ + prior;
   }
 
-  /// The information in all that is known, and its eigenvectors in falling order.
+  /// The total information, and its eigenvectors in descending order.
   void decompose(const Eigen::MatrixXd& J, Refinement& out) const {
     Eigen::MatrixXd information = J.transpose() * J / inflation_;
     if (options_.prior > 0.0)
@@ -174,10 +174,10 @@ class Search {
     if (fresh) J_at_ = out.x;
     Eigen::MatrixXd J = whitened(whiten_, J_);
     Eigen::VectorXd gradient = J.transpose() * (whiten_ * (measured_ - u)).reshaped() / inflation_;
-    if (options_.prior > 0.0) gradient += (believed_ - out.x) / (options_.prior * options_.prior);
+    if (options_.prior > 0.0) gradient += (configured_ - out.x) / (options_.prior * options_.prior);
     for (Eigen::Index i = 0; i < out.x.size(); ++i) {
       if (out.x[i] > lowest_[i] || gradient[i] > 0.0) continue;
-      J.col(i).setZero();  // rests against its limit
+      J.col(i).setZero();  // is at its limit
       gradient[i] = 0.0;
     }
     decompose(J, out);
@@ -203,7 +203,7 @@ class Search {
         out.converged = small || (fresh && before - cost(u, x) < kSame);
         slow_ = length > 0.05 * length_;
         length_ = slow_ ? std::numeric_limits<double>::infinity() : length;
-        tell(out);
+        report_progress(out);
         return true;
       }
       if (small) {
@@ -221,7 +221,7 @@ class Search {
     return false;
   }
 
-  void tell(const Refinement& out) const {
+  void report_progress(const Refinement& out) const {
     if (options_.progress)
       options_.progress(fmt::format("refining the simulated response, round {}", out.rounds));
   }
@@ -257,7 +257,7 @@ class Search {
   }
 
   const Comparison& comparison_;
-  Eigen::VectorXd believed_, lowest_;
+  Eigen::VectorXd configured_, lowest_;
   const RefinementOptions& options_;
   double step_s_ = 0.0;
   Eigen::MatrixXd measured_, whiten_;

@@ -3,18 +3,19 @@
 #include <fmt/format.h>
 
 #include <Eigen/Eigenvalues>
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
 
+#include "softarm/actuation/input_map.hpp"
 #include "softarm/model/actuation_matrix.hpp"
+#include "softarm/model/statics.hpp"
 
 namespace softarm {
 namespace {
 
-constexpr double kLargest_rad = 20.0;     ///< a response beyond it has lost its arm
+constexpr double kLargest_rad = 20.0;     ///< a response beyond it is not that of an arm
 constexpr double kFastest_1ps = 40000.0;  ///< beyond it a simulation takes too long
 constexpr double kStep = 2.0;  ///< times the fastest mode's time constant; stable below 2.78
 
@@ -22,19 +23,14 @@ ArmHypothesis hypothesis(const ArmParameters& arm, const ActuationSettings& actu
   ArmHypothesis out;
   out.arm = arm;
   out.rest_rad.setZero(arm.dof());
-  const bool torque = actuation.kind == ActuationKind::torque;
-  for (std::size_t i = 0; i < actuation.segments.size(); ++i)
-    for (std::size_t j = 0; j < actuation.segments[i].size(); ++j) {
-      const Chamber& chamber = actuation.segments[i][j];
-      out.push.conservativeResize(2, out.push.cols() + 1);
-      if (torque) {  // A_chamber of a unit moment about x, or y
-        out.push.rightCols<1>() << (j == 0 ? 0.0 : 1.0), (j == 0 ? -1.0 : 0.0);
-      } else {
-        out.push.rightCols<1>() << -chamber.gain_nm_per_bar * std::cos(chamber.angle_rad),
-            -chamber.gain_nm_per_bar * std::sin(chamber.angle_rad);
-      }
-      out.segment_of.push_back(static_cast<int>(i));
-    }
+  out.input_map.resize(2, chamber_count(actuation));
+  Eigen::Index first = 0;
+  for (std::size_t i = 0; i < actuation.segments.size(); ++i) {
+    const Eigen::Matrix2Xd map = input_map(actuation.kind, actuation.segments[i]);
+    out.input_map.middleCols(first, map.cols()) = map;
+    out.segment_of.insert(out.segment_of.end(), actuation.segments[i].size(), static_cast<int>(i));
+    first += map.cols();
+  }
   return out;
 }
 
@@ -59,36 +55,19 @@ class Motion {
     return forward_dynamics(plain_, workspace_, u, v, force_, a);
   }
 
-  /// What is left of the static balance: G + springs - push.
+  /// Residual of the static balance: G + springs - input.
   void imbalance(const Eigen::VectorXd& u, const Eigen::VectorXd& input, Eigen::VectorXd& out) {
     push_force(arm_, u, input, force_);
     spring_force(arm_, u, spring_);
-    inverse_dynamics(plain_, workspace_, u, u, u, u,
-                     {.inertia = false, .coriolis = false, .gravity = true}, out);
+    gravity_moments(plain_, workspace_, u, out);
     out += spring_ - force_;
   }
 
-  [[nodiscard]] bool settle(const Eigen::VectorXd& input, Eigen::VectorXd& u) {
-    const Eigen::Index dof = u.size();
-    Eigen::VectorXd residual(dof), moved(dof), shifted(dof);
-    Eigen::MatrixXd jacobian(dof, dof);
-    u = arm_.rest_rad;
-    for (int round = 0; round < 60; ++round) {
-      imbalance(u, input, residual);
-      for (Eigen::Index j = 0; j < dof; ++j) {
-        moved = u;
-        moved[j] += 1e-6;
-        imbalance(moved, input, shifted);
-        jacobian.col(j) = (shifted - residual) / 1e-6;
-      }
-      Eigen::VectorXd step = jacobian.partialPivLu().solve(residual);
-      if (!step.allFinite()) return false;
-      const double length = step.norm();
-      if (length > 0.5) step *= 0.5 / length;
-      u -= step;
-      if (length < 1e-12) return true;
-    }
-    return false;
+  /// The shape at rest under an input.
+  std::optional<Eigen::VectorXd> settled(const Eigen::VectorXd& input) {
+    return solve_balance(
+        [&](const Eigen::VectorXd& u, Eigen::VectorXd& left) { imbalance(u, input, left); },
+        arm_.rest_rad);
   }
 
   /// One step of length h; inputs at its begin, middle and end.
@@ -144,29 +123,30 @@ class Motion {
 
 }  // namespace
 
-ArmHypothesis believed(const Experiment& experiment) {
+ArmHypothesis configured(const Experiment& experiment) {
   ArmHypothesis out = hypothesis(experiment.arm, experiment.actuation);
   const IdentificationSettings& extra = experiment.identification;
   for (std::size_t c = 0; c < extra.rest_u_rad.size(); ++c)
     out.rest_rad[static_cast<Eigen::Index>(c)] = extra.rest_u_rad[c];
   out.cubic_nm_per_rad3 = extra.cubic_nm_per_rad3;
   out.lag_s = extra.lag_s;
-  out.delay_s = extra.delay_s;
+  out.dead_time_s = extra.dead_time_s;
   return out;
 }
 
 ArmHypothesis of_plant(const Experiment& experiment) {
   ArmHypothesis out = hypothesis(experiment.plant.arm, experiment.plant.actuation);
   out.lag_s = experiment.plant.valves.lag_s;
-  out.delay_s = experiment.plant.valves.dead_time_s;
+  out.dead_time_s = experiment.plant.valves.dead_time_s;
   return out;
 }
 
 void push_force(const ArmHypothesis& arm, ConstVectorRef u, const Eigen::VectorXd& input,
                 VectorRef force) {
   force.setZero();
-  for (Eigen::Index j = 0; j < arm.push.cols(); ++j)
-    force.segment<2>(2 * arm.segment_of[static_cast<std::size_t>(j)]) += input[j] * arm.push.col(j);
+  for (Eigen::Index j = 0; j < arm.input_map.cols(); ++j)
+    force.segment<2>(2 * arm.segment_of[static_cast<std::size_t>(j)]) +=
+        input[j] * arm.input_map.col(j);
   if (arm.arm.actuation == ActuationModel::chamber) return;
   for (Eigen::Index i = 0; i < arm.arm.size(); ++i) {
     const Eigen::Vector2d f = force.segment<2>(2 * i);  // = A_chamber tau_A
@@ -199,15 +179,8 @@ double ResponseModel::fastest_1ps(const ArmHypothesis& arm) const {
   }
   const Eigen::VectorXd straight = Eigen::VectorXd::Zero(dof);
   if (!arm.inertia) {
-    Eigen::MatrixXd stiffness = springs.asDiagonal();
-    Eigen::VectorXd moved = straight, weight(dof);
-    for (Eigen::Index j = 0; j < dof; ++j) {
-      moved[j] = 1e-4;
-      inverse_dynamics(arm.arm, workspace, moved, moved, moved, moved,
-                       {.inertia = false, .coriolis = false, .gravity = true}, weight);
-      stiffness.col(j) += weight / 1e-4;
-      moved[j] = 0.0;
-    }
+    Eigen::MatrixXd stiffness = gravity_slope(arm.arm, straight);
+    stiffness.diagonal() += springs;
     const double largest = stiffness.cwiseAbs().rowwise().sum().maxCoeff();  // >= any eigenvalue
     return damping.minCoeff() > 0.0 ? largest / damping.minCoeff()
                                     : std::numeric_limits<double>::infinity();
@@ -241,12 +214,14 @@ bool ResponseModel::simulate(const ArmHypothesis& arm, double longest_step_s,
                              Eigen::MatrixXd& u) const {
   const Eigen::Index frames = record_.time_s.size(), dof = arm.arm.dof();
   u.resize(frames, dof);
-  LaggedInput input(record_.input, arm.lag_s, arm.delay_s);
+  LaggedInput input(record_.input, arm.lag_s, arm.dead_time_s);
   Motion motion(arm);
   motion.reserve(dof);
-  Eigen::VectorXd p0(arm.push.cols()), p1 = p0, p2 = p0, now(dof), v = Eigen::VectorXd::Zero(dof);
+  Eigen::VectorXd p0(arm.input_map.cols()), p1 = p0, p2 = p0, v = Eigen::VectorXd::Zero(dof);
   input.at(record_.time_s[0], p0);
-  if (!motion.settle(p0, now)) return false;
+  const std::optional<Eigen::VectorXd> settled = motion.settled(p0);
+  if (!settled) return false;
+  Eigen::VectorXd now = *settled;
   u.row(0) = now;
   for (Eigen::Index k = 1; k < frames; ++k) {
     const double from_s = record_.time_s[k - 1], span_s = record_.time_s[k] - from_s;

@@ -1,4 +1,4 @@
-// How much less correlated samples say than independent ones.
+// The loss of information in correlated samples compared with independent ones.
 #pragma once
 
 #include <Eigen/Core>

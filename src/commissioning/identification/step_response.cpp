@@ -5,6 +5,7 @@
 #include <numbers>
 #include <stdexcept>
 
+#include "softarm/base/time.hpp"
 #include "softarm/estimation/curvature_estimator.hpp"
 #include "softarm/simulation/arm_plant.hpp"
 #include "softarm/simulation/mocap_simulator.hpp"
@@ -34,7 +35,8 @@ std::vector<std::vector<double>> torque_commands(const Experiment& experiment, d
 
 /// What is identified to a thousandth must be simulated better than that.
 PlantSettings accurate(PlantSettings settings) {
-  if (settings.kind != PlantKind::pcc) return settings;  // its difference to the model is larger
+  if (settings.kind.get_if<PccSettings>() == nullptr)
+    return settings;  // its difference to the model is larger
   settings.method = IntegratorMethod::cash4;
   settings.relative_tolerance = 1e-6;
   settings.absolute_tolerance = 1e-8;
@@ -90,7 +92,7 @@ MotionRecord record_step_response(const Experiment& experiment, const StepPlan& 
   CurvatureEstimate estimate;
   for (Eigen::Index k = 0; k < rows; ++k) {
     const std::int64_t now_ns = mocap.next_capture_ns();
-    const double now_s = 1e-9 * static_cast<double>(now_ns);
+    const double now_s = to_seconds(now_ns);
     plant.advance(now_s);
     plant.segment_ends(ends);
     mocap.capture(plant.base(), ends);

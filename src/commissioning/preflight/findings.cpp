@@ -3,8 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-
-#include "softarm/base/json_writer.hpp"
+#include <nlohmann/json.hpp>
 
 namespace softarm {
 namespace {
@@ -42,29 +41,22 @@ std::string report_text(std::span<const Finding> findings) {
   std::string text;
   for (const Finding& each : findings)
     text += fmt::format("{:<11}  {:<16}  {}{}{}\n", name(each.verdict), each.check, each.text,
-                        each.cure.empty() ? "" : ". Mend: ", each.cure);
+                        each.cure.empty() ? "" : ". Fix: ", each.cure);
   return text + fmt::format("{} passed, {} failed, {} not checked\n",
                             count(findings, Verdict::pass), count(findings, Verdict::fail),
                             count(findings, Verdict::not_checked));
 }
 
 std::string report_json(std::span<const Finding> findings) {
-  JsonWriter json;
-  json.open_object();
-  json.key("findings");
-  json.open_array();
-  for (const Finding& each : findings) {
-    json.open_object();
-    json.member("check", each.check);
-    json.member("verdict", name(each.verdict));
-    json.member("text", each.text);
-    json.member("cure", each.cure);
-    json.close_object();
-  }
-  json.close_array();
-  json.member("failed", static_cast<std::int64_t>(count(findings, Verdict::fail)));
-  json.close_object();
-  return json.text() + "\n";
+  using Json = nlohmann::ordered_json;
+  Json list = Json::array();
+  for (const Finding& each : findings)
+    list.push_back({{"check", each.check},
+                    {"verdict", name(each.verdict)},
+                    {"text", each.text},
+                    {"cure", each.cure}});
+  const Json report{{"findings", std::move(list)}, {"failed", count(findings, Verdict::fail)}};
+  return report.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
 }  // namespace softarm

@@ -1,4 +1,4 @@
-// What the checks of positions and of orientations share.
+// Shared by the checks of positions and of orientations.
 #pragma once
 
 #include <string>
@@ -9,14 +9,18 @@
 
 namespace softarm {
 
-/// What was seen at rest, and the pairs of the pulses.
+/// Mean poses at rest, and the pairs of poses of the pulses.
 struct Poses {
   MeanPoses rest;
   std::vector<BentPair> bent;
 };
-/// @param poses  which reading of them
+/// @param poses  which reading of the quaternions
 Poses poses_of(const Experiment& experiment, const Observation& seen,
                std::vector<BodyPose> SeenFrame::*poses);
+
+/// The curvature that the controller's estimator finds for mean poses, 2n, rad. False if no bend
+/// fits or a body was not seen.
+bool curvature_of(const Experiment& experiment, const MeanPoses& poses, Eigen::VectorXd& u_rad);
 
 /// "base", "end of segment 2"
 std::string place(std::size_t body);
@@ -25,7 +29,7 @@ Finding check_still(const Experiment& experiment, const Observation& seen, const
 Finding check_units(const Experiment& experiment, const MeanPoses& rest);
 Finding check_order(const Experiment& experiment, const MeanPoses& rest);
 Finding check_world_axes(const Experiment& experiment, const MeanPoses& rest);
-/// @param curved  orientations may be used to tell the chord from the arc
+/// @param curved  orientations may be used to distinguish chord and arc
 Finding check_lengths(const Experiment& experiment, const MeanPoses& rest, bool curved);
 /// @param other  poses with the quaternions in the order that is not configured
 Finding check_quaternions(const Experiment& experiment, const Poses& poses, const Poses& other);

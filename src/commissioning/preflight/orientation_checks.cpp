@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "commissioning/preflight/geometry.hpp"
-#include "commissioning/preflight/statics.hpp"
+#include "softarm/model/statics.hpp"
 #include "softarm/transport/settings.hpp"
 
 namespace softarm {
@@ -13,7 +13,7 @@ namespace {
 constexpr double kNormTolerance = 0.02;
 constexpr double kAskew_rad = 0.05;
 
-/// Names of all that fit: about a hanging arm two of them may be the same.
+/// Names of all readings that fit: for a hanging arm two of them may be the same.
 std::vector<std::string> hands_that_fit(const Poses& poses) {
   std::vector<std::string> names;
   for (const Reading& reading : wrong_hands())
@@ -44,12 +44,12 @@ Finding check_quaternions(const Experiment& experiment, const Poses& poses,
     out.verdict = Verdict::pass;
   } else if (fit.fits()) {
     out.text +=
-        "; so they would with the other order, as long as the arm is straight: --pulse "
+        "; as long as the arm is straight, so they would in the other order: --pulse "
         "bends it";
   } else if (other.convinces()) {
     out.verdict = Verdict::fail;
     out.text = fmt::format(
-        "w, x, y, z and x, y, z, w are taken for one another: as configured, chords and "
+        "w, x, y, z and x, y, z, w are interchanged: as configured, chords and "
         "orientations disagree by {:.2f} rad, in the other order by {:.3f} rad",
         fit.at_rest_rad, other.at_rest_rad);
     out.cure = fmt::format(
@@ -72,7 +72,7 @@ Finding check_handedness(const Poses& poses, const Poses& in_other_order) {
   Finding out{.check = "handedness"};
   const ReadingFit fit = fit_of(kAsConfigured, poses.rest, poses.bent);
   if (!fit.fits() && fit_of(kAsConfigured, in_other_order.rest, in_other_order.bent).convinces()) {
-    out.text = "mend the quaternions first";
+    out.text = "fix the quaternions first";
     return out;
   }
   const std::vector<std::string> hands = hands_that_fit(poses);
@@ -92,7 +92,7 @@ Finding check_handedness(const Poses& poses, const Poses& in_other_order) {
         "make the sender's world right-handed, positions and orientations alike, from body "
         "to world";
   } else {
-    out.text = "mend the quaternions first";
+    out.text = "fix the quaternions first";
   }
   return out;
 }
@@ -105,7 +105,9 @@ Finding check_rest_pose(const Experiment& experiment, const MeanPoses& rest) {
     out.text = "not every segment seen";
     return out;
   }
-  const Eigen::VectorXd off_nm = static_force_nm(experiment.arm, u_rad);
+  DynamicsWorkspace workspace(experiment.arm);
+  Eigen::VectorXd off_nm(experiment.arm.dof());
+  static_moments(experiment.arm, workspace, u_rad, off_nm);
   std::vector<std::string> wrong;
   double bend_rad = 0.0, twist_rad = 0.0;
   for (std::size_t i = 0; i + 1 < rest.body.size(); ++i) {
@@ -159,17 +161,17 @@ std::vector<Finding> check_geometry(const Experiment& experiment, const Observat
   out.push_back(check_world_axes(experiment, poses.rest));
   const bool ordered = !failed(out, kUnits) && !failed(out, kOrder);
   const Finding quaternions = failed(out, kOrder)
-                                  ? not_checked(kQuaternions, "mend the order first")
+                                  ? not_checked(kQuaternions, "fix the order first")
                                   : check_quaternions(experiment, poses, in_other_order);
   const bool readable = quaternions.verdict != Verdict::fail && !failed(out, kOrder);
   out.push_back(ordered ? check_lengths(experiment, poses.rest, readable)
-                        : not_checked("lengths", "mend units and order first"));
+                        : not_checked("lengths", "fix units and order first"));
   out.push_back(quaternions);
-  out.push_back(failed(out, kOrder) ? not_checked("handedness", "mend the order first")
+  out.push_back(failed(out, kOrder) ? not_checked("handedness", "fix the order first")
                                     : check_handedness(poses, in_other_order));
   out.push_back(ordered && readable && !failed(out, "handedness")
                     ? check_rest_pose(experiment, poses.rest)
-                    : not_checked("rest pose", "mend what failed above first"));
+                    : not_checked("rest pose", "fix what failed above first"));
   return out;
 }
 

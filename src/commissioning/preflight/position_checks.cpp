@@ -57,7 +57,8 @@ Extent extent_of(const ArmParameters& arm, const MeanPoses& rest) {
   return out;
 }
 
-/// Places along the line through the outermost two, those nearest the configured order first.
+/// Positions along the line through the outermost two bodies, in the direction nearest the
+/// configured order.
 struct AlongLine {
   std::vector<std::size_t> order;
   double beside = 0.0;  ///< farthest from the line, of its length
@@ -75,7 +76,7 @@ AlongLine along_line(const MeanPoses& rest, const Extent& extent) {
   }
   std::sort(out.order.begin(), out.order.end(),
             [&](std::size_t i, std::size_t j) { return along(i) < along(j); });
-  // Which end is the base the line cannot tell: the one that leaves more bodies where they are.
+  // The line does not show which end is the base: choose the one that leaves more bodies in place.
   const std::vector<std::size_t> reversed(out.order.rbegin(), out.order.rend());
   const auto displaced = [&](const std::vector<std::size_t>& order) {
     std::size_t count = 0;
@@ -123,8 +124,9 @@ Finding check_still(const Experiment& experiment, const Observation& seen, const
   out.verdict = part <= kStill ? Verdict::pass : Verdict::fail;
   if (out.verdict == Verdict::fail)
     out.cure =
-        "wait until the arm hangs still, softarm disarm if a daemon moves it; or the camera takes "
-        "two bodies for one another: make their markers differ";
+        "wait until the arm hangs still, softarm disarm if a daemon moves it; or the camera "
+        "confuses "
+        "two bodies: make their markers differ";
   return out;
 }
 
@@ -196,7 +198,7 @@ Finding check_order(const Experiment& experiment, const MeanPoses& rest) {
   for (const std::size_t body : line.order) ids.push_back(id(body));
   out.cure = "exchange them in daemon.bodies or in the motion capture";
   if (ids.size() == rest.body.size() && bodies.base_id >= 0 &&
-      experiment.transport.mocap.source != MocapSourceKind::rigid_transform)
+      !experiment.transport.mocap.source.channel_per_body)
     out.cure = fmt::format("daemon.bodies: {{base_id: {}, segment_ids: [{}]}}", ids.front(),
                            fmt::join(ids.begin() + 1, ids.end(), ", "));
   return out;

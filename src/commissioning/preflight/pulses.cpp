@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "softarm/base/clock.hpp"
+#include "commissioning/guarded_motion.hpp"
 #include "softarm/commissioning/preflight/checks.hpp"
 #include "softarm/runtime/safety_monitor.hpp"
 
@@ -15,107 +15,81 @@ constexpr std::int64_t kLost_ns = 200'000'000;  ///< without a frame, or when th
 constexpr double kSoft_bar_per_s = 1.0;
 constexpr double kBefore_s = 0.2;  ///< at rest, to compare with
 
-std::int64_t to_ns(double time_s) { return static_cast<std::int64_t>(1e9 * time_s); }
+std::int64_t lost_ns(const Experiment& experiment) {
+  return std::max(kLost_ns,
+                  resolve_thresholds(experiment.safety, 1.0 / experiment.rate_hz).vent_after_ns);
+}
 
 class Player {
  public:
-  Player(const Experiment& experiment, LcmNode& node, ArmListener& listener, Commander& commander,
-         const std::function<bool()>& stop)
-      : node_(node),
-        listener_(listener),
-        commander_(commander),
-        stop_(stop),
-        lost_ns_(std::max(
-            kLost_ns,
-            resolve_thresholds(experiment.safety, 1.0 / experiment.rate_hz).vent_after_ns)),
-        least_bar_(PressureVector::Constant(commander.chambers(),
-                                            experiment.actuation.min_pressure_bar)) {}
+  Player(ArmClient& client, Observer& observer, const std::function<bool()>& stop)
+      : client_(client),
+        observer_(observer),
+        motion_(client, lost_ns(client.experiment()), stop),
+        least_bar_(PressureVector::Constant(client.set_points_bar().size(),
+                                            client.experiment().actuation.min_pressure_bar)) {}
 
   void pulse(Pulse pulse, double hold_s) {
-    pulse.before_ns = monotonic_now_ns();
+    pulse.before_ns = client_.now_ns();
     hold(least_bar_, kBefore_s);
     PressureVector filled_bar = least_bar_;
     filled_bar[pulse.valve] = pulse.pressure_bar;
-    pulse.start_ns = monotonic_now_ns();
+    pulse.start_ns = client_.now_ns();
     reach(filled_bar);
     hold(filled_bar, 2.0 / 3.0 * hold_s);
-    pulse.held_ns = monotonic_now_ns();
+    pulse.held_ns = client_.now_ns();
     hold(filled_bar, hold_s / 3.0);
-    pulse.end_ns = monotonic_now_ns();
-    if (!aborted_.empty()) return;
-    listener_.seen().pulses.push_back(pulse);
+    pulse.end_ns = client_.now_ns();
+    if (!aborted().empty()) return;
+    observer_.add(pulse);
     reach(least_bar_);
     rest(hold_s);
   }
   void rest(double time_s) { hold(least_bar_, 0.75 * time_s); }
 
-  const std::string& aborted() const { return aborted_; }
+  const std::string& aborted() const { return motion_.aborted(); }
 
  private:
-  template <class Done>
-  void command(const PressureVector& bar, const Done& done) {
-    for (std::int64_t now_ns = monotonic_now_ns(); !done(now_ns); now_ns = monotonic_now_ns()) {
-      if (aborted_.empty())
-        aborted_ = stop_ && stop_()       ? "stopped"
-                   : commander_.held_up() ? Commander::kHeldUp
-                                          : listener_.beyond_limits(lost_ns_);
-      if (!aborted_.empty()) return;
-      commander_.update(bar, kSoft_bar_per_s, now_ns);
-      node_.wait_until(commander_.next_ns());
-      listener_.look_at_clock();
-    }
-  }
   void hold(const PressureVector& bar, double time_s) {
-    const std::int64_t end_ns = monotonic_now_ns() + to_ns(time_s);
-    command(bar, [&](std::int64_t now_ns) { return now_ns >= end_ns; });
+    const std::int64_t end_ns = client_.now_ns() + to_ns(time_s);
+    motion_.command(bar, kSoft_bar_per_s, [&] { return client_.now_ns() >= end_ns; });
   }
   void reach(const PressureVector& bar) {
-    command(bar, [&](std::int64_t) { return commander_.sent_bar() == bar; });
+    motion_.command(bar, kSoft_bar_per_s, [&] { return client_.set_points_bar() == bar; });
   }
 
-  LcmNode& node_;
-  ArmListener& listener_;
-  Commander& commander_;
-  const std::function<bool()>& stop_;
-  std::int64_t lost_ns_;
+  ArmClient& client_;
+  Observer& observer_;
+  GuardedMotion motion_;
   PressureVector least_bar_;
-  std::string aborted_;
 };
 
 }  // namespace
 
-std::string play_pulses(const Experiment& experiment, const PulsePlan& plan, LcmNode& node,
-                        ArmListener& listener, Commander& commander,
+std::string play_pulses(ArmClient& client, Observer& observer, const PulsePlan& plan,
                         const std::function<bool()>& stop,
                         const std::function<void(const std::string&)>& progress) {
-  listener.commanding();
-  Player player(experiment, node, listener, commander, stop);
-  const double least_bar = experiment.actuation.min_pressure_bar;
-  try {
-    player.rest(1.0);  // whoever holds the valves gets to know us with zeros
-    int valve = 0;
-    for (int i = 0; i < experiment.arm.size(); ++i) {
-      const auto& chambers = experiment.actuation.segments[static_cast<std::size_t>(i)];
-      for (int j = 0; j < static_cast<int>(chambers.size()) && player.aborted().empty();
-           ++j, ++valve) {
-        if (progress) progress(fmt::format("pulse {} of {}", valve + 1, commander.chambers()));
-        const double above_bar =
-            plan.pressure_bar > 0.0 ? plan.pressure_bar : soft_pressure_bar(experiment, i, j);
-        player.pulse({.segment = i,
-                      .chamber = j,
-                      .valve = valve,
-                      .pressure_bar =
-                          std::min(least_bar + above_bar, experiment.actuation.max_pressure_bar)},
-                     plan.hold_s);
-      }
+  const Experiment& experiment = client.experiment();
+  const ActuationSettings& actuation = experiment.actuation;
+  Player player(client, observer, stop);
+  player.rest(1.0);  // with zeros, so that the valve driver accepts us as the sender
+  int valve = 0;
+  for (int i = 0; i < experiment.arm.size(); ++i) {
+    const auto chambers = static_cast<int>(actuation.segments[static_cast<std::size_t>(i)].size());
+    for (int j = 0; j < chambers && player.aborted().empty(); ++j, ++valve) {
+      if (progress) progress(fmt::format("pulse {} of {}", valve + 1, chamber_count(actuation)));
+      const double above_bar =
+          plan.pressure_bar > 0.0 ? plan.pressure_bar : soft_pressure_bar(experiment, i, j);
+      player.pulse({.segment = i,
+                    .chamber = j,
+                    .valve = valve,
+                    .pressure_bar = std::min(actuation.min_pressure_bar + above_bar,
+                                             actuation.max_pressure_bar)},
+                   plan.hold_s);
     }
-  } catch (...) {
-    commander.vent_to_rest();
-    throw;
   }
-  const std::string aborted = player.aborted();
-  commander.vent_to_rest();
-  return aborted;
+  client.vent_to_rest();
+  return player.aborted();
 }
 
 }  // namespace softarm

@@ -1,4 +1,4 @@
-// How the numbers of a body might have been meant, and which meaning makes arcs of the segments.
+// Possible readings of the poses of the bodies, and which of them makes the segments arcs.
 #pragma once
 
 #include <Eigen/Core>
@@ -42,10 +42,12 @@ struct ReadingFit {
   double at_rest_rad = 0.0;  ///< largest disagreement of a segment at rest
   double twist_rad = 0.0;    ///< largest at rest
   double bent = 0.0;      ///< of the changes by pulses: 0 they agree, 1 they have nothing in common
-  bool has_bent = false;  ///< pulses bent the arm enough to tell
-  /// The segments may be arcs in this reading. Half a radian is more than any plate is askew.
+  bool has_bent = false;  ///< pulses bent the arm enough to decide
+  /// The segments may be arcs in this reading. Half a radian is more than any marker frame is
+  /// tilted.
   bool fits() const { return at_rest_rad < 0.5 && (!has_bent || bent < 0.5); }
-  /// Besides, x axes are parallel: a reading that nobody asked for has to explain that too.
+  /// In addition, x axes are parallel: a reading other than the configured one must explain that
+  /// too.
   bool convinces() const { return fits() && twist_rad < 0.5; }
 };
 ReadingFit fit_of(const Reading& reading, const MeanPoses& rest, std::span<const BentPair> bent);

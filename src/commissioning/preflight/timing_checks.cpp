@@ -5,6 +5,8 @@
 #include <limits>
 #include <optional>
 
+#include "commissioning/median.hpp"
+#include "softarm/base/time.hpp"
 #include "softarm/commissioning/preflight/checks.hpp"
 #include "softarm/runtime/safety_monitor.hpp"
 #include "softarm/runtime/settings.hpp"
@@ -17,12 +19,12 @@ constexpr double kSeenEnough = 0.99;        ///< of the frames
 constexpr double kRateTolerance = 0.05;     ///< of the period
 constexpr double kMissingTolerance = 0.01;  ///< of the frames
 constexpr double kLatencyTolerance_s = 0.002;
-constexpr double kLongestLatency_s = 1.0;  ///< more than that is two clocks
+constexpr double kLongestLatency_s = 1.0;  ///< a longer latency means two clocks
 
 std::string body_name(std::size_t index, const TransportSettings& transport) {
   const BodySettings& bodies = transport.bodies;
   const std::string what = index == 0 ? "base" : fmt::format("end of segment {}", index);
-  if (transport.mocap.source == MocapSourceKind::rigid_transform)
+  if (transport.mocap.source.channel_per_body)
     return fmt::format("{} (channel {})", what,
                        body_channel(transport.lcm, index == 0 ? bodies.base_plate
                                                               : bodies.segment_plates[index - 1]));
@@ -36,20 +38,19 @@ Finding check_bodies(const Experiment& experiment, const Observation& seen) {
   Finding out{.check = kBodies};
   const LcmSettings& lcm = experiment.transport.lcm;
   const std::string channels = fmt::format("{}", fmt::join(seen.channels, ", "));
-  const double listened_s = 1e-9 * static_cast<double>(seen.rest_end_ns - seen.start_ns);
+  const double listened_s = to_seconds(seen.rest_end_ns - seen.start_ns);
   if (seen.frames.empty()) {
     out.verdict = Verdict::fail;
     out.text = fmt::format("no frame on {} within {:.1f} s", channels, listened_s);
     if (seen.not_frames > 0)
-      out.text += fmt::format(", but {} packets that are no frame", seen.not_frames);
+      out.text += fmt::format(", but {} packets that are not frames", seen.not_frames);
     out.cure = fmt::format(
-        "start the sender of frames, or mend transport.mocap.source; it must publish on {} at {}",
+        "start the sender of frames, or fix daemon.mocap.source; it must publish on {} at {}",
         channels, lcm.url);
     return out;
   }
   const auto count = static_cast<int>(seen.frames.front().body.size());
-  const MeanPoses mean =
-      mean_poses(seen, seen.start_ns, std::numeric_limits<std::int64_t>::max(), count);
+  const MeanPoses mean = mean_poses(seen, seen.start_ns, kForever, count);
   std::vector<std::string> missing;
   for (std::size_t i = 0; i < mean.seen.size(); ++i)
     if (mean.seen[i] < kSeenEnough)
@@ -58,8 +59,7 @@ Finding check_bodies(const Experiment& experiment, const Observation& seen) {
                                                           body_name(i, experiment.transport),
                                                           100.0 * mean.seen[i]));
   out.text = fmt::format("{} frames in {:.1f} s on {}", seen.frames.size(),
-                         1e-9 * static_cast<double>(seen.frames.back().arrival_ns - seen.start_ns),
-                         channels);
+                         to_seconds(seen.frames.back().arrival_ns - seen.start_ns), channels);
   if (missing.empty()) {
     out.verdict = Verdict::pass;
     out.text += fmt::format(", all {} bodies seen", count);
@@ -93,18 +93,12 @@ Times times_of(const Observation& seen) {
     if (last != nullptr && frame.number <= last->number) continue;  // repeated or overtaken
     last = &frame;
     out.number.push_back(frame.number);
-    out.arrival_s.push_back(1e-9 * static_cast<double>(frame.arrival_ns - seen.start_ns));
+    out.arrival_s.push_back(to_seconds(frame.arrival_ns - seen.start_ns));
     out.s.push_back(
         out.stamped ? 1e-6 * static_cast<double>(frame.sender_us - seen.frames.front().sender_us)
                     : out.arrival_s.back());
   }
   return out;
-}
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 Finding check_rate(const Experiment& experiment, const Times& times) {
@@ -126,7 +120,7 @@ Finding check_rate(const Experiment& experiment, const Times& times) {
   } else if (missing > kMissingTolerance) {
     out.verdict = Verdict::fail;
     out.cure =
-        "a wired network of its own between camera host and this machine; a receive buffer "
+        "a separate wired network between camera host and this machine; a receive buffer "
         "that holds the frames";
   } else {
     out.verdict = Verdict::pass;
@@ -138,8 +132,7 @@ Finding check_jitter(const Experiment& experiment, const Times& times) {
   Finding out{.check = "jitter"};
   const SafetySettings& safety = experiment.safety;
   const double hold_s =
-      1e-9 *
-      static_cast<double>(resolve_thresholds(safety, 1.0 / experiment.rate_hz).hold_after_ns);
+      to_seconds(resolve_thresholds(safety, 1.0 / experiment.rate_hz).hold_after_ns);
   double longest_s = 0.0, least_s = 1e300, most_s = -1e300;
   int late = 0;
   for (std::size_t k = 0; k < times.s.size(); ++k) {
@@ -151,26 +144,27 @@ Finding check_jitter(const Experiment& experiment, const Times& times) {
     longest_s = std::max(longest_s, gap_s);
     late += gap_s + safety.frame_latency_s > hold_s ? 1 : 0;
   }
-  out.text = fmt::format("frames arrive at most {:.1f} ms after one another", 1e3 * longest_s);
+  out.text = fmt::format("frames arrive at most {:.1f} ms apart", 1e3 * longest_s);
   if (times.stamped)
-    out.text += fmt::format(", their way varies by {:.1f} ms", 1e3 * (most_s - least_s));
+    out.text += fmt::format(", with a jitter of {:.1f} ms", 1e3 * (most_s - least_s));
   out.text += fmt::format("; HOLD after {:.1f} ms", 1e3 * hold_s);
   out.verdict = late > 0 ? Verdict::fail : Verdict::pass;
   if (late > 0) {
-    out.text += fmt::format(", which would have come {} times", late);
-    out.cure = "quieten the network and this machine, or raise safety.hold_after_s";
+    out.text += fmt::format(", which would have occurred {} times", late);
+    out.cure =
+        "reduce the load on the network and this machine, or raise daemon.safety.hold_after_s";
   }
   return out;
 }
 
-/// Least time from stamp to arrival, if the stamps are of one of our clocks.
+/// Shortest time from stamp to arrival, if the stamps are from one of our clocks.
 std::optional<double> least_latency_s(const Observation& seen, std::string& clock) {
-  std::int64_t least_ns = INT64_MAX;
+  std::int64_t least_ns = kForever;
   for (const SeenFrame& frame : seen.frames)
     least_ns = std::min(least_ns, frame.arrival_ns - 1000 * frame.sender_us);
   for (const auto& [name, offset_ns] : {std::pair<const char*, std::int64_t>{"monotonic clock", 0},
                                         {"wall clock", seen.wall_minus_ns}}) {
-    const double latency_s = 1e-9 * static_cast<double>(least_ns + offset_ns);
+    const double latency_s = to_seconds(least_ns + offset_ns);
     if (latency_s < -1e-3 || latency_s > kLongestLatency_s) continue;
     clock = name;
     return latency_s;
@@ -189,14 +183,15 @@ Finding check_latency(const Experiment& experiment, const Observation& seen, con
     }
     out.verdict = Verdict::fail;
     out.text = "the sender's time stamps do not advance";
-    out.cure = "stamp every frame at exposure, or transport.capture_time: latency";
+    out.cure = "stamp every frame at exposure, or daemon.capture_time: latency";
     return out;
   }
   std::string clock;
   const std::optional<double> least_s = least_latency_s(seen, clock);
   if (!least_s) {
     out.text = fmt::format(
-        "the sender's clock is none of ours, so only changes of latency show (see jitter); {:.1f} "
+        "the sender's clock is not one of ours, so only changes of latency show (see jitter); "
+        "{:.1f} "
         "ms declared",
         1e3 * declared_s);
     return out;

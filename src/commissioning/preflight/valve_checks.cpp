@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "commissioning/preflight/valve_map.hpp"
-#include "softarm/client/commander.hpp"
 #include "softarm/commissioning/preflight/checks.hpp"
 #include "softarm/transport/settings.hpp"
 
@@ -26,7 +25,7 @@ std::string valve_name(const Experiment& experiment, int valve) {
   return fmt::format("valve {}", valve);
 }
 
-/// Mean of every chamber over [from, to); empty where nothing came.
+/// Mean of every chamber over [from, to); empty if there is no measurement.
 std::vector<double> mean_bar(const Observation& seen, std::int64_t from_ns, std::int64_t to_ns,
                              int chambers) {
   std::vector<double> mean(static_cast<std::size_t>(chambers), 0.0);
@@ -67,11 +66,12 @@ Finding check_pressures(const Experiment& experiment, const Observation& seen) {
     out.cure = "actuation.chambers of this arm, and the configuration softarm-valves was given";
     return out;
   }
-  // What is left from before has to leave first.
+  // Pressure from before must vent first.
   const std::vector<double> rest =
       mean_bar(seen, seen.start_ns + kSettled_ns, seen.rest_end_ns, chambers);
   if (rest.empty() || seen.commanded_by_others) {
-    out.text = rest.empty() ? "none measured while the arm rested" : "somebody commands pressures";
+    out.text =
+        rest.empty() ? "none measured while the arm rested" : "another program commands pressures";
     return out;
   }
   const auto most = std::max_element(rest.begin(), rest.end(),
@@ -87,8 +87,8 @@ Finding check_pressures(const Experiment& experiment, const Observation& seen) {
   return out;
 }
 
-/// What is wrong with the pressures of one pulse; empty where nothing is, `measured` false where
-/// none came.
+/// What is wrong with the pressures of one pulse; empty if nothing is. Sets `measured` to false if
+/// there is no measurement.
 std::vector<std::string> leaks_of(const Experiment& experiment, const Observation& seen,
                                   const Pulse& pulse, bool& measured) {
   std::vector<std::string> out;
@@ -151,13 +151,13 @@ Finding check_leaks(const Experiment& experiment, const Observation& seen) {
 std::vector<Finding> check_valves(const Experiment& experiment, const Observation& seen,
                                   const std::vector<Finding>& geometry) {
   std::vector<Finding> out{check_pressures(experiment, seen)};
-  // A wrong hand or a wrong length still tells which chamber moves which segment.
+  // Even with a wrong handedness or length it is clear which chamber moves which segment.
   const bool readable = !failed(geometry, kUnits) && !failed(geometry, kOrder) &&
                         !failed(geometry, kQuaternions) && !failed(geometry, "handedness") &&
                         !failed(geometry, kStillCheck);
   out.push_back(
       readable ? check_valve_map(experiment, seen)
-               : Finding{"valve map", Verdict::not_checked, "mend what failed above first", ""});
+               : Finding{"valve map", Verdict::not_checked, "fix what failed above first", ""});
   out.push_back(check_leaks(experiment, seen));
   return out;
 }

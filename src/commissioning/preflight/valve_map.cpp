@@ -6,8 +6,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "commissioning/preflight/statics.hpp"
-#include "softarm/client/commander.hpp"
+#include "commissioning/preflight/geometry.hpp"
+#include "softarm/model/statics.hpp"
 
 namespace softarm {
 namespace {
@@ -22,7 +22,7 @@ std::string chamber_name(int segment, int chamber) {
   return fmt::format("chamber {} of segment {}", chamber + 1, segment + 1);
 }
 
-/// The chamber of the segment it acts on whose angle fits what was measured; -1 where none does.
+/// The chamber, of the segment it acts on, whose angle fits the measurement; -1 if there is none.
 int acts_like(const Experiment& experiment, const PulseResponse& response) {
   const auto& chambers = experiment.actuation.segments[static_cast<std::size_t>(response.segment)];
   for (std::size_t j = 0; j < chambers.size(); ++j)
@@ -33,7 +33,7 @@ int acts_like(const Experiment& experiment, const PulseResponse& response) {
 
 using Responses = std::vector<PulseResponse>;
 
-/// What one mistake would explain in every chamber; empty where none does.
+/// The single mistake that explains all chambers; empty if there is none.
 std::string common_cause(const Responses& responses, std::string& cure) {
   const auto all = [&](auto&& holds) {
     return std::all_of(responses.begin(), responses.end(), holds);
@@ -84,7 +84,8 @@ std::string one_problem(const Experiment& experiment, const PulseResponse& respo
   return "";
 }
 
-/// valves.order under which every chamber is what it acts as; empty where that is no rearrangement.
+/// The valves.order with which every chamber acts as configured; empty if that is not a
+/// permutation.
 std::vector<int> mended_order(const Experiment& experiment, const Responses& responses) {
   std::vector<int> first(1, 0);
   for (const auto& chambers : experiment.actuation.segments)
@@ -126,8 +127,11 @@ std::optional<PulseResponse> response_to(const Experiment& experiment, const Obs
                     before_rad) ||
       !curvature_of(experiment, mean_poses(seen, pulse.held_ns, pulse.end_ns, bodies), held_rad))
     return std::nullopt;
-  const Eigen::VectorXd moment_nm =
-      static_force_nm(experiment.arm, held_rad) - static_force_nm(experiment.arm, before_rad);
+  DynamicsWorkspace workspace(experiment.arm);
+  Eigen::VectorXd moment_nm(experiment.arm.dof()), before_nm(experiment.arm.dof());
+  static_moments(experiment.arm, workspace, held_rad, moment_nm);
+  static_moments(experiment.arm, workspace, before_rad, before_nm);
+  moment_nm -= before_nm;
   const Chamber& chamber = experiment.actuation.segments[static_cast<std::size_t>(pulse.segment)]
                                                         [static_cast<std::size_t>(pulse.chamber)];
   PulseResponse out{.pulse = pulse,

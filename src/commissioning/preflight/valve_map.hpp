@@ -1,4 +1,4 @@
-// Which chamber bends which segment where.
+// Which chamber bends which segment, and in which direction.
 #pragma once
 
 #include <optional>
@@ -8,13 +8,13 @@
 
 namespace softarm {
 
-/// What one pulse did, as the moment that the model needs for it.
+/// The response to one pulse, as the moment with which the model explains it.
 struct PulseResponse {
   Pulse pulse;
   double configured_rad = 0.0;  ///< the chamber's angle chi
   double configured_nm = 0.0;   ///< gain times pressure
-  int segment = 0;              ///< that the largest moment acts on
-  double measured_rad = 0.0;    ///< angle of a chamber that would act so
+  int segment = 0;              ///< on which the largest moment acts
+  double measured_rad = 0.0;    ///< angle of a chamber with this effect
   double measured_nm = 0.0;
   bool silent() const { return measured_nm < 0.2 * configured_nm; }
   bool astray() const { return segment != pulse.segment; }
@@ -22,7 +22,7 @@ struct PulseResponse {
   double turned_rad() const;
 };
 
-/// Nothing where the arm was not seen whole before or during the pulse.
+/// Empty if some body was not seen before or during the pulse.
 std::optional<PulseResponse> response_to(const Experiment& experiment, const Observation& seen,
                                          const Pulse& pulse);
 

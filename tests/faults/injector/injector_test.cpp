@@ -9,6 +9,7 @@
 #include "softarm/model/kinematics.hpp"
 #include "softarm/transport/mocap_adapter.hpp"
 #include "softarm/transport/settings.hpp"
+#include "softarm/transport/softarm_mocap.hpp"
 
 namespace softarm {
 namespace {
@@ -36,7 +37,9 @@ class Injector : public ::testing::Test {
     for (std::size_t i = 0; i < 3; ++i)
       frame.body[i + 1] = {ends[i].translation(), Eigen::Quaterniond(ends[i].linear()), true};
     softarm_messages::mocap_frame_t message;
-    MocapAdapter(bodies, arm).to_message(frame, number * kPeriod_ns / 1000, message);
+    const auto passed = std::make_unique<SentFrame>();
+    MocapAdapter(bodies, arm).to_sent(frame, number * kPeriod_ns / 1000, *passed);
+    to_message(*passed, message);
     return message;
   }
 
@@ -57,7 +60,9 @@ class Injector : public ::testing::Test {
       softarm_messages::mocap_frame_t message;
       while (injector.next(k * kPeriod_ns, message)) {
         MocapFrame frame;
-        adapter.to_frame(message, frame);
+        const auto passed = std::make_unique<SentFrame>();
+        to_sent(message, *passed);
+        adapter.to_frame(*passed, frame);
         frame.capture_ns = message.capture_time_us * 1000;
         const FrameVerdict verdict = validator.accept(frame);
         if (k > 20) ++found[verdict];

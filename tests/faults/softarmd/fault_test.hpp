@@ -95,9 +95,9 @@ class FaultTest : public ::testing::TestWithParam<Machine>, protected Station {
     const double step =
         std::max(actuation.slew_bar_per_s, actuation.vent_bar_per_s) / experiment.rate_hz;
     EXPECT_TRUE(station.all_finite_);
-    EXPECT_GE(station.lowest_, 0.0F);
-    EXPECT_LE(station.highest_, static_cast<float>(actuation.max_pressure_bar));
-    EXPECT_LE(station.largest_step_, static_cast<float>(step) * 1.00001F);
+    EXPECT_GE(station.lowest_bar_, 0.0);
+    EXPECT_LE(station.highest_bar_, actuation.max_pressure_bar);
+    EXPECT_LE(station.largest_step_bar_, step * 1.00001) << "1.00001 for rounding on the wire";
   }
 
  private:

@@ -49,7 +49,7 @@ TEST_P(FrameFaults, WithoutGoodFramesTheDaemonHoldsThenVents) {
         Row{"inf", 0.0, true}, Row{"quaternion", 0.0, true}, Row{"length", 0.0, true},
         Row{"swap", 0.0, true}, Row{"delay", 0.3, true}}) {
     SCOPED_TRACE(row.fault);
-    const int rejected = status_.frames_rejected;
+    const std::int64_t rejected = status_.frames_rejected;
     inject(row.fault, row.amount);
     EXPECT_TRUE(becomes(*this, Mode::vent, Reason::frames_stale)) << told() << daemon_->printed();
     EXPECT_TRUE(saw(Mode::hold, Reason::frames_late)) << told();
@@ -68,14 +68,13 @@ TEST_P(FrameFaults, WhatIsDroppedOrCompensatedDisturbsNothing) {
   struct Row {
     const char* fault;
     double amount;
-    int softarm_messages::controller_status_t::*counter;
+    std::int64_t ArmStatus::*counter;
   };
-  using Status = softarm_messages::controller_status_t;
-  for (const Row& row : {Row{"duplicate", 0.0, &Status::frames_repeated},
-                         Row{"reorder", 0.0, &Status::frames_rejected},
-                         Row{"jump", 0.0, &Status::frames_rejected}}) {
+  for (const Row& row : {Row{"duplicate", 0.0, &ArmStatus::frames_repeated},
+                         Row{"reorder", 0.0, &ArmStatus::frames_rejected},
+                         Row{"jump", 0.0, &ArmStatus::frames_rejected}}) {
     SCOPED_TRACE(row.fault);
-    const int before = status_.*row.counter;
+    const std::int64_t before = status_.*row.counter;
     // Every other frame is refused, so a HOLD for another reason (a busy machine) would not end.
     bool undisturbed = false;
     for (int k = 0; k < 5 && !undisturbed; ++k) {
@@ -89,15 +88,15 @@ TEST_P(FrameFaults, WhatIsDroppedOrCompensatedDisturbsNothing) {
   }
 
   // Late frames, within the bound: the age is known, u is predicted over it.
-  const float age_s = status_.frame_age_s;
+  const double age_s = status_.frame_age_s;
   inject("delay", 0.03);
-  EXPECT_TRUE(wait_for([&] { return status_.frame_age_s > age_s + 0.02F; })) << told();
+  EXPECT_TRUE(wait_for([&] { return status_.frame_age_s > age_s + 0.02; })) << told();
   EXPECT_TRUE(stays_active(*this)) << told() << daemon_->printed();
   recovers();
 
   // The sender's clock is set forward, and with the end of the fault back.
   inject("clock", 3600.0);
-  const int accepted = status_.frames_accepted;
+  const std::int64_t accepted = status_.frames_accepted;
   EXPECT_TRUE(stays_active(*this)) << told() << daemon_->printed();
   EXPECT_TRUE(wait_for([&] { return status_.frames_accepted > accepted + 40; }));
   recovers();
@@ -108,7 +107,7 @@ TEST_P(FrameFaults, WhatIsDroppedOrCompensatedDisturbsNothing) {
 TEST_P(FrameFaults, FrozenPosesHoldAndARestartedSenderVents) {
   inject("freeze");
   EXPECT_TRUE(becomes(*this, Mode::hold, Reason::poses_frozen)) << told() << daemon_->printed();
-  const std::vector<float> held = command_.pressure_bar;
+  const PressureVector held = command_.pressure_bar;
   const int commands = commands_;
   ASSERT_TRUE(wait_for([&] { return commands_ > commands + 50; }));
   EXPECT_EQ(command_.pressure_bar, held);
@@ -134,18 +133,14 @@ TEST_P(FrameFaults, WithExplicitArmingARestartedSenderMustBeArmedAnew) {
   configure(*this, ", arming: explicit");
   statuses_ = 0;
   daemon_ = start("softarmd");
-  const auto arm = [&](std::int64_t number) {
-    node_->publish("SOFTARM_OPERATOR",
-                   softarm_messages::operator_command_t{.sequence = number, .request = 1});
-  };
   ASSERT_TRUE(becomes(*this, Mode::wait_frames, Reason::waiting_for_arm)) << daemon_->printed();
-  arm(1);
+  client_->send(OperatorRequest::arm);
   ASSERT_TRUE(wait_for([&] { return under_pressure(); })) << told();
   inject("restart");
   EXPECT_TRUE(becomes(*this, Mode::vent, Reason::waiting_for_arm)) << told();
   EXPECT_TRUE(saw(Mode::vent, Reason::sender_restarted)) << told();
   EXPECT_EQ(largest(command_.pressure_bar), 0.0F);
-  arm(2);
+  client_->send(OperatorRequest::arm);
   EXPECT_TRUE(wait_for([&] { return mode() == Mode::active; })) << told();
 }
 

@@ -10,6 +10,7 @@
 #include "dev/fault/hostile_packets.hpp"
 #include "faults/softarmd/fault_test.hpp"
 #include "softarm/base/clock.hpp"
+#include "softarm/base/time.hpp"
 
 namespace softarm {
 namespace {
@@ -28,18 +29,14 @@ constexpr bool kSanitized = false;
 class HostileBytes : public FaultTest {
  protected:
   void arm() {
-    using Request = softarm_messages::operator_command_t;
-    Request request{.sequence = 0, .request = Request::ARM};
-    EXPECT_TRUE(wait_for([&] {
-      if (mode() != Mode::active && ++request.sequence % 10 == 0)
-        node_->publish("SOFTARM_OPERATOR", request);
+    EXPECT_TRUE(wait_for([&, asked = 0]() mutable {
+      if (mode() != Mode::active && ++asked % 10 == 0) client_->send(OperatorRequest::arm);
       return under_pressure();
     })) << told();
   }
 
   bool arm_is_vented() const {
-    return plant_.vented != 0 && !plant_.pressure_bar.empty() &&
-           largest(plant_.pressure_bar) < 1e-3F;
+    return plant_.vented && plant_.pressure_bar.size() > 0 && largest(plant_.pressure_bar) < 1e-3F;
   }
 };
 
@@ -65,7 +62,7 @@ TEST_P(HostileBytes, MalformedPacketsWithoutEndAreRefusedWhileTheArmIsControlled
   const auto daemon = start("softarmd");
   const auto deadman = start("softarm", {"deadman"});
   arm();
-  const int before = status_.messages_malformed;
+  const std::int64_t before = status_.messages_malformed;
   long memory_kb = 0;
   forget();
 
@@ -75,14 +72,13 @@ TEST_P(HostileBytes, MalformedPacketsWithoutEndAreRefusedWhileTheArmIsControlled
   const int ticks_before = statuses_;
   for (long sent = 0; sent < packets;) {  // slowly enough for the real frames to come through
     for (int k = 0; k < 4 && sent < packets; ++k) sent += sender.send(hostile.next()) ? 1 : 0;
-    node_->wait_until(monotonic_now_ns() + test::kSecond / 1000);
-    node_->drain(100);
+    client_->update(client_->now_ns() + test::kSecond / 1000);
     // LCM's buffers grow to what they need first.
     if (memory_kb == 0 && sent > packets / 10) memory_kb = resident_kb(daemon->pid());
   }
-  const double passed_s = 1e-9 * static_cast<double>(monotonic_now_ns() - start_ns);
+  const double passed_s = to_seconds(monotonic_now_ns() - start_ns);
   EXPECT_TRUE(stays_active(*this)) << told() << daemon->printed();
-  const int refused = status_.messages_malformed - before;
+  const std::int64_t refused = status_.messages_malformed - before;
   const long grown_kb = resident_kb(daemon->pid()) - memory_kb;
   std::cout << packets << " malformed packets in " << passed_s << " s, " << refused
             << " reached softarmd's decoders and were refused, " << statuses_ - ticks_before
@@ -123,7 +119,7 @@ TEST_P(HostileBytes, TheFragmentThatEndsEverySubscriberLeavesTheArmVentedAndTheR
   auto daemon = start("softarmd");
   arm();
 
-  node_.reset();  // it would end us as well
+  client_.reset();  // it would end us as well
   RawSender sender(url_);
   for (const char* channel : {"SOFTARM_MOCAP", "SOFTARM_PRESSURE_COMMAND"})
     for (const Packet& packet : fragments_that_end_subscribers(channel)) sender.send(packet);

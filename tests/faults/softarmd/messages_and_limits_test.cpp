@@ -7,6 +7,7 @@
 #include "dev/fault/raw_packets.hpp"
 #include "faults/softarmd/fault_test.hpp"
 #include "softarm/base/clock.hpp"
+#include "softarm/base/time.hpp"
 #include "softarm/transport/settings.hpp"
 
 namespace softarm {
@@ -37,7 +38,7 @@ TEST_P(MessagesAndLimits, HostileBytesAndAFloodAreCountedAndHarmless) {
   const LcmSettings lcm = load_experiment(config_.string()).transport.lcm;
   const std::vector<Packet> hostile = hostile_packets(lcm);
   RawSender sender(url_);
-  const int before = status_.messages_malformed;
+  const std::int64_t before = status_.messages_malformed;
   const std::int64_t start_ns = monotonic_now_ns();
   for (int round = 0; round < 20; ++round) {
     for (const Packet& packet : hostile) sender.send(packet);
@@ -45,7 +46,7 @@ TEST_P(MessagesAndLimits, HostileBytesAndAFloodAreCountedAndHarmless) {
   }
   EXPECT_TRUE(wait_for([&] { return status_.messages_malformed > before + 200; })) << told();
   EXPECT_TRUE(stays_active(*this)) << told() << daemon->printed();
-  const double passed_s = 1e-9 * static_cast<double>(monotonic_now_ns() - start_ns);
+  const double passed_s = to_seconds(monotonic_now_ns() - start_ns);
   EXPECT_TRUE(wait_for([&] { return count(daemon->printed(), "malformed") > 0; }));
   EXPECT_LE(count(daemon->printed(), "malformed"), 2.0 + passed_s) << "told once a second at most";
 
@@ -63,12 +64,9 @@ TEST_P(MessagesAndLimits, HostileBytesAndAFloodAreCountedAndHarmless) {
       << told();
   stop = true;
   flood.join();
-  using Request = softarm_messages::operator_command_t;
-  Request request{.sequence = 0, .request = Request::ARM};
-  EXPECT_TRUE(wait_for([&] {
-    request.request = mode() == Mode::fault ? Request::DISARM : Request::ARM;
-    if (mode() != Mode::active && ++request.sequence % 10 == 0)
-      node_->publish("SOFTARM_OPERATOR", request);
+  EXPECT_TRUE(wait_for([&, asked = 0]() mutable {
+    if (mode() != Mode::active && ++asked % 10 == 0)
+      client_->send(mode() == Mode::fault ? OperatorRequest::disarm : OperatorRequest::arm);
     return under_pressure();
   })) << told()
       << daemon->printed();
@@ -107,11 +105,9 @@ TEST_P(MessagesAndLimits, ReferencesOutOfReachAndThroughTheStraightPoseStayBound
     processes.push_back(start_plant(station));
     processes.push_back(station.start("softarmd"));
   }
-  EXPECT_TRUE(wait_for([&] { return (flags_seen_ & status_.BOUNDED) != 0; }))
-      << told() << processes[1]->printed();
+  EXPECT_TRUE(wait_for([&] { return saw_bounded_; })) << told() << processes[1]->printed();
   EXPECT_TRUE(unreachable.wait_for([&] {
-    return (unreachable.flags_seen_ & status_.SATURATED) != 0 &&
-           (unreachable.flags_seen_ & status_.SLEW_LIMITED) != 0;
+    return unreachable.saw_saturated_ && unreachable.saw_slew_limited_;
   })) << unreachable.told()
       << processes[3]->printed();
   EXPECT_TRUE(stays_active(unreachable)) << unreachable.told() << processes[3]->printed();
@@ -132,13 +128,11 @@ TEST_P(MessagesAndLimits, TheSingularPoseOfTheCouplesStaysBounded) {
             "      - {time_s: 4, theta_rad: 0}\n");
   const auto plant = start_plant(*this);
   const auto daemon = start("softarmd");
-  using Request = softarm_messages::operator_command_t;
-  Request arm{.sequence = 0, .request = Request::ARM};
-  const auto bounded = [&] {
+  const auto bounded = [&, asked = 0]() mutable {
     // A busy machine may drive the arm beyond its soft limit first.
-    if (reason() == Reason::waiting_for_arm && ++arm.sequence % 10 == 0)
-      node_->publish("SOFTARM_OPERATOR", arm);
-    return (flags_seen_ & status_.BOUNDED) != 0;
+    if (reason() == Reason::waiting_for_arm && ++asked % 10 == 0)
+      client_->send(OperatorRequest::arm);
+    return saw_bounded_;
   };
   EXPECT_TRUE(wait_for(bounded, 30.0)) << told() << daemon->printed();
   const int commands = commands_;

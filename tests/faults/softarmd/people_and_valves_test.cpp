@@ -7,7 +7,6 @@ namespace softarm {
 namespace {
 
 using namespace std::chrono_literals;
-using softarm_messages::operator_command_t;
 using test::FaultTest;
 using test::Process;
 
@@ -20,13 +19,9 @@ class PeopleAndValves : public FaultTest {
     if (printed != nullptr) *printed = process->printed();
     return code;
   }
-  void request(std::int8_t what) {
-    node_->publish("SOFTARM_OPERATOR", operator_command_t{.sequence = ++number_, .request = what});
-  }
   bool vented() {
     return wait_for([&] { return mode() >= Mode::vent && largest(command_.pressure_bar) == 0.0F; });
   }
-  std::int64_t number_ = 0;
 };
 
 TEST_P(PeopleAndValves, ArmDisarmEmergencyStopAndDeadMan) {
@@ -111,18 +106,17 @@ TEST_P(PeopleAndValves, SilentOrLeakingValvesAreALatchedFault) {
       return mode() == Mode::active && largest(command_.pressure_bar) > 0.5F;
     })) << told();
     Fault fault = *find_fault(row.fault);
-    const auto& bar = command_.pressure_bar;
-    fault.body = static_cast<int>(std::max_element(bar.begin(), bar.end()) - bar.begin());
+    command_.pressure_bar.maxCoeff(&fault.body);  // the index of the largest
     relay->set(fault);
     EXPECT_TRUE(becomes(*this, Mode::fault, row.reason)) << told() << daemon->printed();
     EXPECT_TRUE(vented()) << told();
     relay->set({});
-    const int accepted = status_.frames_accepted;
+    const std::int64_t accepted = status_.frames_accepted;
     ASSERT_TRUE(wait_for([&] { return status_.frames_accepted > accepted + 40; }));
     EXPECT_EQ(mode(), Mode::fault) << "it is latched";
-    request(operator_command_t::DISARM);
+    client_->send(OperatorRequest::disarm);
     ASSERT_TRUE(becomes(*this, Mode::vent, Reason::waiting_for_arm)) << told();
-    request(operator_command_t::ARM);
+    client_->send(OperatorRequest::arm);
     ASSERT_TRUE(wait_for([&] { return under_pressure(); })) << told();
   }
   expect_limits(*this);

@@ -63,7 +63,7 @@ TEST_P(Surroundings, AWallClockThatIsSetDisturbsNothing) {
     for (int k = 0; k < 5 && !undisturbed; ++k) {
       clock.set_offset_s(k % 2 == 0 ? offset_s : offset_s + 7200);
       const std::int64_t reads = clock.reads();
-      const int accepted = status_.frames_accepted;
+      const std::int64_t accepted = status_.frames_accepted;
       active_in_row_ = 0;
       undisturbed = wait_for([&] { return active_in_row_ >= 100; }, 2.0);
       EXPECT_TRUE(wait_for([&] { return status_.frames_accepted > accepted + 20; })) << told();

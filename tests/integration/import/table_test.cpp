@@ -143,7 +143,7 @@ TEST_F(Import, TellsWhatIsWrongWithTheMap) {
                 "map.yaml:7: base.position: expected 3 names of columns, got 2"},
            Case{"mx my mz", "mx my nz", "map.yaml:9: segments[0].position: expected a column of"},
            Case{"id: 9", "id: 7",
-                "map.yaml:10: segments[1].id: expected an id of its own, got 7 again"},
+                "map.yaml:10: segments[1].id: expected a distinct id, got 7 again"},
            Case{"wxyz", "zyxw", "map.yaml:5: quaternion_order: expected one of xyzw, wxyz"},
            Case{"commanded: set", "commanded: setpoint",
                 "map.yaml:11: pressures.commanded: expected"},

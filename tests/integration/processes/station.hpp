@@ -5,7 +5,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <functional>
@@ -17,10 +16,8 @@
 
 #include "dev/soak/command_steps.hpp"
 #include "integration/processes/process.hpp"
-#include "softarm/base/clock.hpp"
-#include "softarm/runtime/safety_monitor.hpp"
-#include "softarm/transport/lcm_node.hpp"
-#include "softarm/transport/message_decoding.hpp"
+#include "softarm/client/arm_client.hpp"
+#include "softarm/config/load.hpp"
 
 namespace softarm::test {
 
@@ -43,28 +40,32 @@ class Station {
   Station(const Station&) = delete;
   Station& operator=(const Station&) = delete;
 
-  /// Begins to listen. @throws TransportError
+  /// Begins to listen, whatever the configuration under test is. @throws TransportError
   void listen() {
-    node_ = std::make_unique<LcmNode>(url_);
-    node_->subscribe("SOFTARM_STATUS", 4096, [this](const ReceivedMessage& packet) {
-      if (!decode(packet.bytes, status_)) return;
+    Experiment arm = load_experiment(SOFTARM_SOURCE_DIR "/config/paper_arm.yaml");
+    arm.transport.lcm.url = url_;
+    client_ = std::make_unique<ArmClient>(arm);
+    client_->on_status([this](const ArmStatus& status) {
+      status_ = status;
       ++statuses_;
       active_in_row_ = mode() == Mode::active ? active_in_row_ + 1 : 0;
       seen_.insert({mode(), reason()});
-      flags_seen_ |= status_.flags;
+      saw_bounded_ |= status.bounded;
+      saw_saturated_ |= status.saturated;
+      saw_slew_limited_ |= status.slew_limited;
     });
-    node_->subscribe("SOFTARM_PLANT", 4096, [this](const ReceivedMessage& packet) {
-      if (decode(packet.bytes, plant_)) ++plant_states_;
+    client_->on_plant([this](const PlantState& plant) {
+      plant_ = plant;
+      ++plant_states_;
     });
-    node_->subscribe("SOFTARM_PRESSURE_COMMAND", 4096, [this](const ReceivedMessage& packet) {
-      if (!decode(packet.bytes, command_)) return;
+    client_->on_command([this](const ChamberCommand& command) {
+      command_ = command;
       ++commands_;
-      largest_step_ = std::max(largest_step_, steps_.take(command_));
-      for (const float bar : command_.pressure_bar) {
-        if (!std::isfinite(bar)) all_finite_ = false;
-        lowest_ = std::min(lowest_, bar);
-        highest_ = std::max(highest_, bar);
-      }
+      largest_step_bar_ = std::max(largest_step_bar_, steps_.take(command));
+      if (command.pressure_bar.size() == 0) return;
+      all_finite_ &= command.pressure_bar.allFinite();
+      lowest_bar_ = std::min(lowest_bar_, command.pressure_bar.minCoeff());
+      highest_bar_ = std::max(highest_bar_, command.pressure_bar.maxCoeff());
     });
   }
 
@@ -91,46 +92,41 @@ class Station {
 
   /// Handles messages until `reached`, or `patience_s` have passed; says which.
   bool wait_for(const std::function<bool()>& reached, double patience_s = 10.0) {
-    const std::int64_t end_ns = monotonic_now_ns() + static_cast<std::int64_t>(patience_s * 1e9);
-    while (monotonic_now_ns() < end_ns) {
-      if (reached()) return true;
-      node_->wait_until(monotonic_now_ns() + kSecond / 100);
-    }
-    return reached();
+    return client_->wait_for(reached, patience_s);
   }
 
-  Mode mode() const { return statuses_ > 0 ? static_cast<Mode>(status_.mode) : Mode::init; }
-  Reason reason() const { return static_cast<Reason>(status_.reason); }
+  Mode mode() const { return statuses_ > 0 ? status_.mode : Mode::init; }
+  Reason reason() const { return status_.reason; }
   /// "VENT (frames_stale)", of now and of all that was seen.
   std::string told() const {
-    std::string text = std::string(name(mode())) + " (" + name(reason()) + "), seen:";
+    std::string text = status_.text() + ", seen:";
     for (const auto& [m, r] : seen_) text += std::string(" ") + name(m) + "(" + name(r) + ")";
     return text;
   }
   void forget() { seen_.clear(); }
   bool saw(Mode m, Reason r) const { return seen_.count({m, r}) > 0; }
 
-  static float largest(const std::vector<float>& pressures) {
-    return pressures.empty() ? 0.0F : *std::max_element(pressures.begin(), pressures.end());
+  static double largest(const PressureVector& pressures) {
+    return pressures.size() > 0 ? pressures.maxCoeff() : 0.0;
   }
   bool under_pressure() const {
-    return mode() == Mode::active && largest(plant_.pressure_bar) > 0.1F;
+    return mode() == Mode::active && largest(plant_.pressure_bar) > 0.1;
   }
 
   std::filesystem::path folder_, config_;
   std::string url_;
   std::string lcm_;  ///< more keys of daemon.lcm, each with a comma before it
-  std::unique_ptr<LcmNode> node_;
-  softarm_messages::controller_status_t status_{};
-  softarm_messages::plant_state_t plant_{};
-  softarm_messages::pressure_command_t command_{};
+  std::unique_ptr<ArmClient> client_;
+  ArmStatus status_;
+  PlantState plant_;
+  ChamberCommand command_;
   CommandSteps steps_;
   int statuses_ = 0, plant_states_ = 0, commands_ = 0, started_ = 0;
   int active_in_row_ = 0;                   ///< statuses up to the newest
   std::set<std::pair<Mode, Reason>> seen_;  ///< since `forget`
-  int flags_seen_ = 0;
-  // Of all commands so far, bar.
-  float lowest_ = 0.0F, highest_ = 0.0F, largest_step_ = 0.0F;
+  bool saw_bounded_ = false, saw_saturated_ = false, saw_slew_limited_ = false;
+  // Of all commands so far.
+  double lowest_bar_ = 0.0, highest_bar_ = 0.0, largest_step_bar_ = 0.0;
   bool all_finite_ = true;
 };
 

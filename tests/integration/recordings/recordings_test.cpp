@@ -7,7 +7,7 @@
 #include <lcm/lcm-cpp.hpp>
 
 #include "integration/processes/process.hpp"
-#include "softarm/base/clock.hpp"
+#include "softarm/client/arm_client.hpp"
 #include "softarm/config/load.hpp"
 #include "softarm/recording/logged_run.hpp"
 #include "softarm/transport/lcm_node.hpp"
@@ -205,31 +205,29 @@ TEST_F(Recordings, PlayedIntoAShadowDaemonTheyGoThroughThePipeline) {
   const auto config = folder_ / "config.yaml";
   std::ofstream(config) << "include: " << kSource / "config" / "recorded_circle.yaml"
                         << "\ndaemon:\n  lcm: {url: \"" << url << "\"}\n";
-  std::unique_ptr<LcmNode> node;
+  std::unique_ptr<ArmClient> client;
   try {
-    node = std::make_unique<LcmNode>(url);
+    client = std::make_unique<ArmClient>(config);
   } catch (const TransportError& error) {
     GTEST_SKIP() << error.what();
   }
-  softarm_messages::controller_status_t status{};
-  softarm_messages::pressure_command_t command{};
-  int active = 0;  // a busy machine may be late with a frame: HOLD for a while is no fault
-  node->subscribe("SOFTARM_STATUS", 1024, [&](const ReceivedMessage& packet) {
-    if (decode(packet.bytes, status) && status.mode == static_cast<int>(Mode::active)) ++active;
+  ArmStatus status;  // of a shadow
+  int active = 0;    // a busy machine may be late with a frame: HOLD for a while is no fault
+  client->on_status([&](const ArmStatus& newest) {
+    status = newest;
+    if (status.mode == Mode::active) ++active;
   });
-  node->subscribe("SOFTARM_PRESSURE_COMMAND", 1024,
-                  [&](const ReceivedMessage& packet) { decode(packet.bytes, command); });
   Process daemon("softarmd", {"--shadow", config}, folder_ / "daemon");
   Process player("/lcm-logplayer", {"--lcm-url=" + url, "-e", "SOFTARM_MOCAP", log},
                  folder_ / "player");
-  const auto end = std::chrono::steady_clock::now() + 30s;
-  while (std::chrono::steady_clock::now() < end && status.frames_accepted < 200)
-    node->wait_until(monotonic_now_ns() + 10'000'000);
-  EXPECT_GE(status.frames_accepted, 200) << daemon.printed() << player.printed();
+  EXPECT_TRUE(client->wait_for([&] { return status.frames_accepted >= 200; }, 30.0))
+      << daemon.printed() << player.printed();
   EXPECT_GT(active, 50) << daemon.printed();
   EXPECT_GT(status.frames_repeated, 50);
-  EXPECT_NE(command.shadow, 0);
-  EXPECT_GT(status.theta_rad.at(0), 1e-3F);
+  ASSERT_TRUE(client->command());
+  EXPECT_TRUE(client->command()->shadow);
+  EXPECT_FALSE(client->status()) << "of a daemon that commands there is none";
+  EXPECT_GT(status.theta_rad[0], 1e-3);
   daemon.signal(SIGTERM);
   EXPECT_EQ(daemon.wait(1000ms), 0) << daemon.printed();
 }

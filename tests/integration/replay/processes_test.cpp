@@ -7,22 +7,21 @@
 #include <cstdlib>
 #include <filesystem>
 #include <functional>
+#include <softarm_messages/mocap_frame_t.hpp>
 
 #include "integration/processes/process.hpp"
 #include "softarm/base/clock.hpp"
+#include "softarm/client/arm_client.hpp"
 #include "softarm/config/load.hpp"
 #include "softarm/runtime/safety_monitor.hpp"
 #include "softarm/transport/event_log.hpp"
 #include "softarm/transport/lcm_node.hpp"
-#include "softarm/transport/message_decoding.hpp"
 
 namespace softarm {
 namespace {
 
 using namespace std::chrono_literals;
 using test::Process;
-
-constexpr std::int64_t kSecond = 1'000'000'000;
 
 double seconds_asked() {
   const char* asked = std::getenv("SOFTARM_REPLAY_SECONDS");
@@ -42,12 +41,13 @@ class ReplayOfProcesses : public ::testing::Test {
     std::ofstream(config_) << resolved_text(
         experiment_);  // all of it: nothing may change meanwhile
     try {
-      node_ = std::make_unique<LcmNode>(url_);
-      node_->subscribe("SOFTARM_STATUS", 4096, [this](const ReceivedMessage& packet) {
-        if (!decode(packet.bytes, status_)) return;
+      client_ = std::make_unique<ArmClient>(experiment_);
+      client_->on_status([this](const ArmStatus& status) {
+        status_ = status;
         ++statuses_;
         modes_[static_cast<std::size_t>(status_.mode)] += 1;
       });
+      sender_ = std::make_unique<LcmNode>(url_);
     } catch (const TransportError& error) {
       GTEST_SKIP() << error.what();
     }
@@ -59,15 +59,10 @@ class ReplayOfProcesses : public ::testing::Test {
                                      folder_ / ("printed" + std::to_string(started_++)));
   }
   bool wait_for(const std::function<bool()>& reached, double patience_s = 20.0) {
-    const std::int64_t end_ns = monotonic_now_ns() + static_cast<std::int64_t>(patience_s * 1e9);
-    while (monotonic_now_ns() < end_ns) {
-      if (reached()) return true;
-      node_->wait_until(monotonic_now_ns() + kSecond / 100);
-    }
-    return reached();
+    return client_->wait_for(reached, patience_s);
   }
   bool reach(Mode mode) {
-    return wait_for([&] { return statuses_ > 0 && static_cast<Mode>(status_.mode) == mode; });
+    return wait_for([&] { return statuses_ > 0 && status_.mode == mode; });
   }
   void go_on(double seconds) {
     wait_for([] { return false; }, seconds);
@@ -86,7 +81,7 @@ class ReplayOfProcesses : public ::testing::Test {
     })) << logger->printed();
     const auto daemon = start("softarmd", {config_});
     ASSERT_TRUE(reach(Mode::active)) << daemon->printed();
-    const std::int64_t end_ns = monotonic_now_ns() + static_cast<std::int64_t>(1e9 * seconds);
+    const std::int64_t end_ns = monotonic_now_ns() + to_ns(seconds);
     do {
       go_on(0.3);
       daemon->signal(SIGSTOP);
@@ -101,6 +96,7 @@ class ReplayOfProcesses : public ::testing::Test {
       ASSERT_TRUE(reach(Mode::active)) << daemon->printed();
       plant->signal(SIGKILL);
       ASSERT_TRUE(reach(Mode::vent)) << daemon->printed();
+      plant->wait(10s);  // it holds its lock until it is gone
       plant = start("softarm-plant", {config_});
       ASSERT_TRUE(reach(Mode::active)) << daemon->printed() << plant->printed();
       ++rounds_;
@@ -126,7 +122,7 @@ class ReplayOfProcesses : public ::testing::Test {
       frame.capture_time_us = monotonic_now_ns() / 1000;
       frame.bodies[1].valid = k % 2 == 0 ? 1 : 0;
       frame.bodies[1].position_m[0] = std::nan("");
-      node_->publish("SOFTARM_MOCAP", frame);
+      sender_->publish("SOFTARM_MOCAP", frame);
       go_on(0.005);
     }
   }
@@ -163,8 +159,9 @@ class ReplayOfProcesses : public ::testing::Test {
       load_experiment(std::filesystem::path(SOFTARM_SOURCE_DIR) / "config/paper_arm.yaml");
   std::filesystem::path folder_, config_, log_;
   std::string url_, printed_, daemon_printed_;
-  std::unique_ptr<LcmNode> node_;
-  softarm_messages::controller_status_t status_{};
+  std::unique_ptr<ArmClient> client_;
+  std::unique_ptr<LcmNode> sender_;
+  ArmStatus status_;
   std::array<int, 16> modes_{};
   int statuses_ = 0, started_ = 0, rounds_ = 0;
 };

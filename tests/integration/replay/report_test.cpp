@@ -6,8 +6,8 @@
 #include <fstream>
 #include <sstream>
 
-#include "integration/replay/recorded_log.hpp"
 #include "program_output.hpp"
+#include "unit/recording/recorded_log.hpp"
 
 namespace softarm {
 namespace {
@@ -68,6 +68,23 @@ TEST_F(Report, StepsOverDamageAndSaysWhere) {
   EXPECT_EQ(outcome.code, 65);
   EXPECT_NE(outcome.text.find("damaged"), std::string::npos) << outcome.text;
   EXPECT_GE(logged_modes().size(), run.modes.size() - 2);
+}
+
+// A time that is damaged is none: nothing overflows, and the run is no longer for it.
+TEST_F(Report, LeavesOutAStatusOfAnImpossibleTime) {
+  test::LogBytes log;
+  const test::RecordedRun run = test::record_run(load_experiment(kConfig), 1.0, false, log);
+  std::string bytes = log.bytes;
+  const std::string channel = "SOFTARM_STATUS";
+  std::size_t at = bytes.size() / 2;
+  for (const char* time : {"\x7f\xff\xff\xff\xff\xff\xff\xff", "\x80\0\0\0\0\0\0\0"}) {
+    at = bytes.find(channel, at + 1);
+    ASSERT_NE(at, std::string::npos);
+    bytes.replace(at + channel.size() + 8, 8, time, 8);  // after the hash of the type
+  }
+  const Outcome outcome = report(bytes);
+  EXPECT_EQ(outcome.code, 0) << outcome.text;
+  EXPECT_EQ(logged_modes().size(), run.modes.size() - 2);
 }
 
 TEST_F(Report, SaysWhatALogLacks) {

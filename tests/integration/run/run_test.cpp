@@ -154,6 +154,39 @@ TEST_F(Run, WrongCommandLinesExitWith64) {
   }
 }
 
+/// Every command of a program that has sub-commands, as its help lists them.
+std::vector<std::string> subcommands(const std::string& help) {
+  std::vector<std::string> names;
+  std::istringstream lines(help.substr(help.find("Subcommands:")));
+  for (std::string line, name; std::getline(lines, line);)
+    if (line.starts_with("  ") && !line.starts_with("   ") && std::istringstream(line) >> name)
+      names.push_back(name);
+  return names;
+}
+
+// A word that is misspelt is the likelier reason why something seems to be missing.
+TEST_F(Run, AnUnknownOptionIsNamedWhateverElseIsMissing) {
+  std::vector<std::vector<std::string>> commands{
+      {"softarmd"}, {"softarm-plant"}, {"softarm-valves"}, {"example_serial_pressure_board"}};
+  for (const char* program : {"softarm", "softarm-dev"}) {
+    commands.push_back({program});
+    ASSERT_EQ(start(program, {"--help"}), 0);
+    for (const std::string& name : subcommands(printed)) commands.push_back({program, name});
+  }
+  ASSERT_EQ(start("softarm-dev", {"bench", "--help"}), 0);
+  for (const std::string& name : subcommands(printed))
+    commands.push_back({"softarm-dev", "bench", name});
+  EXPECT_GT(commands.size(), 25u);
+  commands.push_back({"softarm", "check", "--pulse"});  // it requires --live
+  for (const std::vector<std::string>& command : commands) {
+    std::vector<std::string> arguments(command.begin() + 1, command.end());
+    arguments.emplace_back("--nope");
+    EXPECT_EQ(start(command.front(), arguments), 64) << command.back();
+    EXPECT_NE(printed.find("not expected: --nope"), std::string::npos)
+        << command.back() << ": " << printed;
+  }
+}
+
 TEST_F(Run, WrongConfigurationsExitWith78AndSayWhere) {
   const std::string missing = (folder / "missing.yaml").string();
   const std::string unknown =

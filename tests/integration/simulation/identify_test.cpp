@@ -30,13 +30,13 @@ Linear linear(const Experiment& experiment, bool per_segment) {
   FitChoice choice;
   choice.per_segment = per_segment;
   choice.lag = choice.delay = false;
-  const ParameterSet set(believed(experiment), experiment.actuation.kind, choice);
-  return {set, fit_linear(set, record_step_response(experiment, {}), set.believed(), 0.2)};
+  const ParameterSet set(configured(experiment), experiment.actuation.kind, choice);
+  return {set, fit_linear(set, record_step_response(experiment, {}), set.configured(), 0.2)};
 }
 
 TEST(Identify, LeastSquaresFindThePccPlantsOwnParameters) {
   Experiment experiment = load_experiment(kConfig / "paper_simulation.yaml");
-  experiment.plant.kind = PlantKind::pcc;
+  experiment.plant.kind = PccSettings{};
   for (SegmentParameters& segment : experiment.plant.arm.segments) {
     segment.stiffness_nm_per_rad = 2.7;  // not what the controller believes
     segment.damping_nms_per_rad = 0.35;
@@ -50,7 +50,7 @@ TEST(Identify, LeastSquaresFindThePccPlantsOwnParameters) {
 
 TEST(Identify, LeastSquaresTellSegmentsApart) {
   Experiment experiment = load_experiment(kConfig / "paper_simulation.yaml");
-  experiment.plant.kind = PlantKind::pcc;
+  experiment.plant.kind = PccSettings{};
   const double stiffness[] = {1.5, 2.0, 2.5, 3.0};
   for (std::size_t i = 0; i < 4; ++i)
     experiment.plant.arm.segments[i].stiffness_nm_per_rad = stiffness[i];
@@ -70,14 +70,14 @@ TEST(Identify, RefusesWhatTellsNothing) {
   const Experiment experiment = load_experiment(kConfig / "paper_simulation.yaml");
   FitChoice choice;
   choice.lag = choice.delay = false;
-  const ParameterSet set(believed(experiment), experiment.actuation.kind, choice);
+  const ParameterSet set(configured(experiment), experiment.actuation.kind, choice);
   MotionRecord still;
   still.time_s = Eigen::VectorXd::LinSpaced(5000, 0.0, 5.0);
   still.u_rad.setZero(5000, 8);
   still.input.time_s = still.time_s;
   still.input.value.setZero(5000, 8);
-  EXPECT_THROW(fit_linear(set, still, set.believed(), 0.2), std::runtime_error);
-  EXPECT_THROW(fit_linear(set, still.part(0.0, 0.02, 0.0), set.believed(), 0.2),
+  EXPECT_THROW(fit_linear(set, still, set.configured(), 0.2), std::runtime_error);
+  EXPECT_THROW(fit_linear(set, still.part(0.0, 0.02, 0.0), set.configured(), 0.2),
                std::runtime_error);
 }
 

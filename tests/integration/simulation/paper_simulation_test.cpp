@@ -53,10 +53,11 @@ TipTracking track(const Experiment& experiment, double duration_s) {
 TEST(PaperSimulation, IsThatOfSectionVI) {
   const Experiment e = configured("paper_simulation.yaml");
   ASSERT_EQ(e.arm.size(), 4);
-  EXPECT_EQ(e.plant.kind, PlantKind::links);
-  EXPECT_EQ(e.plant.links.links_per_segment, 6);
-  EXPECT_EQ(e.plant.links.joint_stiffness_nm_per_rad, 12.0);
-  EXPECT_EQ(e.plant.links.joint_damping_nms_per_rad, 3.0);
+  const auto* links = e.plant.kind.get_if<LinkSettings>();
+  ASSERT_NE(links, nullptr);
+  EXPECT_EQ(links->links_per_segment, 6);
+  EXPECT_EQ(links->joint_stiffness_nm_per_rad, 12.0);
+  EXPECT_EQ(links->joint_damping_nms_per_rad, 3.0);
   double length_m = 0.0, mass_kg = 0.0;
   for (const SegmentParameters& segment : e.plant.arm.segments) {
     length_m += segment.length_m;
@@ -97,7 +98,7 @@ TEST(PaperSimulation, MatricesOfPlantAndControllerMayDiffer) {
 
 /// The paper's lemniscate with the simple plant: what differs from section VI is only the plant.
 Experiment on_the_model(Experiment experiment) {
-  experiment.plant.kind = PlantKind::pcc;
+  experiment.plant.kind = PccSettings{};
   return experiment;
 }
 
@@ -130,22 +131,22 @@ TEST(PaperSimulation, OnTheModelItselfOnlyThePathsTimeLawIsLeft) {
 }
 
 TEST(ShapeLog, PointsEndWhereThePlantEnds) {
-  for (const PlantKind kind : {PlantKind::pcc, PlantKind::refined, PlantKind::links}) {
+  for (const PlantKind& kind : {PlantKind(PccSettings{}), PlantKind(RefinedSettings{.pieces = 3}),
+                                PlantKind(LinkSettings{})}) {
     Experiment experiment = configured("paper_simulation.yaml");
     experiment.plant.kind = kind;
-    experiment.plant.refined = {
-        .pieces = 3, .length_weights = {}, .mass_weights = {}, .rigidity_weights = {}};
     experiment.plant.initial_u_rad << 0.3, -0.2, 0.9, 0.4, -0.5, 0.6, 1.2, 0.1;
     const ArmPlant plant(experiment.plant);
     std::vector<Eigen::Isometry3d> ends(4);
     plant.segment_ends(ends);
-    const auto points = arm_points(experiment.plant, plant.coordinates());
+    const PlantShape shape = kind.make(experiment.plant)->shape(plant.coordinates());
+    const auto& points = shape.points_m;
     const std::size_t per_segment = (points.size() - 1) / 4;
     ASSERT_EQ(points.size(), 4 * per_segment + 1);
     for (std::size_t i = 0; i < 4; ++i)
       EXPECT_LT((points[(i + 1) * per_segment] - ends[i].translation()).norm(), 1e-12);
     // Where every part bends alike, the parts' bends are shares of the segment's.
-    const Eigen::VectorXd bends = part_bends(experiment.plant, plant.coordinates());
+    const Eigen::VectorXd& bends = shape.bend_rad;
     const auto parts = bends.size() / 8;
     for (Eigen::Index k = 0; k < 8; k += 2) {
       const Eigen::Vector2d part = bends.segment<2>(parts * k);

@@ -55,19 +55,5 @@ TEST(BenchMethods, EveryMethodOfEverySizeRuns) {
   }
 }
 
-TEST(InterleavedTiming, CountsCallsAndQuantiles) {
-  int calls = 0;
-  InterleavedTiming timing;
-  timing.add([&calls](int count) { calls += count; });
-  timing.measure(1e-3, [](double) {});
-  EXPECT_GE(timing.time(0).rounds, 3U);
-  EXPECT_GT(calls, 100);
-  EXPECT_NEAR(timing.ratio(0, 0), 1.0, 1e-15);
-  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_DOUBLE_EQ(quantile({4.0, kNan, 1.0, 2.0, 3.0}, 0.5), 2.5);
-  EXPECT_DOUBLE_EQ(quantile({4.0, 1.0, 2.0, 3.0, 5.0}, 0.25), 2.0);
-  EXPECT_TRUE(std::isnan(quantile({kNan}, 0.5)));
-}
-
 }  // namespace
 }  // namespace softarm

@@ -11,6 +11,7 @@
 #include "softarm/config/load.hpp"
 #include "softarm/control/gain_check.hpp"
 #include "softarm/model/dynamics.hpp"
+#include "softarm/model/statics.hpp"
 
 namespace softarm {
 namespace {

@@ -21,10 +21,9 @@ struct KindCase {
 
 void PrintTo(const KindCase& example, std::ostream* out) { *out << example.name; }
 
-PlantSettings arm_of(PlantKind kind, int segments, int parts, double bend_rad = 0.0) {
+PlantSettings arm_of(MakeKind kind, int segments, int parts, double bend_rad = 0.0) {
   PlantSettings settings = paper_arm(MassModel::distributed, segments);
-  settings.kind = kind;
-  settings.refined.pieces = settings.links.links_per_segment = parts;
+  settings.kind = kind(parts);
   settings.initial_u_rad.setZero(2 * segments);
   for (int i = 0; i < segments; ++i) {
     settings.initial_u_rad[2 * i] = bend_rad * std::cos(0.7 * i);
@@ -52,7 +51,7 @@ PlantSettings with_damping(PlantSettings settings, double factor) {
 }
 
 /// One segment with a moment that bends it beyond pi.
-PlantSettings by_torque(PlantKind kind, int parts) {
+PlantSettings by_torque(MakeKind kind, int parts) {
   PlantSettings settings = arm_of(kind, 1, parts);
   set_torque_actuation(settings.actuation, 1, 10.0);
   settings.valves.supply_pressure_bar = 10.0;
@@ -61,7 +60,7 @@ PlantSettings by_torque(PlantKind kind, int parts) {
 
 /// The arm of section VI: 24 links, 1 m, 1 kg.
 PlantSettings section_six(MassModel mass = MassModel::distributed) {
-  PlantSettings settings = arm_of(PlantKind::links, 4, 6, 0.6);
+  PlantSettings settings = arm_of(kLinks, 4, 6, 0.6);
   settings.arm.mass = mass;
   settings.arm.segments.assign(
       4,
@@ -76,9 +75,6 @@ std::vector<double> one_side(int segments) {
 }
 
 std::vector<KindCase> cases() {
-  constexpr auto kPcc = PlantKind::pcc;
-  constexpr auto kRefined = PlantKind::refined;
-  constexpr auto kLinks = PlantKind::links;
   return {
       {"refined_release_from_2_rad", arm_of(kRefined, 3, 4, 2.0), 0.3, {}},
       {"links_release_from_2_rad", arm_of(kLinks, 3, 6, 2.0), 0.3, {}},
@@ -130,7 +126,7 @@ INSTANTIATE_TEST_SUITE_P(Plant, KindsHardCases, ::testing::ValuesIn(cases()),
                          [](const auto& example) { return std::string(example.param.name); });
 
 TEST(LinksPlant, AreDrivenThroughPiWithoutNoticing) {
-  PlantSettings settings = arm_of(PlantKind::links, 1, 6);
+  PlantSettings settings = arm_of(kLinks, 1, 6);
   settings.arm.gravity_mps2.setZero();
   set_torque_actuation(settings.actuation, 1, 10.0);
   settings.valves.supply_pressure_bar = 10.0;

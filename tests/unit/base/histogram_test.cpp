@@ -140,5 +140,18 @@ TEST(InstanceLock, ASecondHolderIsRefusedUntilTheFirstIsGone) {
   InstanceLock again(name);
 }
 
+// The kernel takes 107 bytes: names that begin alike, of two arms, must not exclude each other.
+TEST(InstanceLock, LongNamesAreToldApartByTheirEnds) {
+  const std::string begin = "test of " + std::to_string(monotonic_now_ns()) + std::string(200, 'x');
+  for (const std::size_t length : {80, 98, 99, 100, 101, 150, 200}) {
+    const std::string name = begin.substr(0, length);
+    InstanceLock first(name + "1");
+    InstanceLock second(name + "2");
+    InstanceLock longer(name + "11");
+    EXPECT_THROW(InstanceLock again(name + "1"), OtherInstance) << length;
+    EXPECT_THROW(InstanceLock again(name + "11"), OtherInstance) << length;
+  }
+}
+
 }  // namespace
 }  // namespace softarm

@@ -56,6 +56,7 @@ TEST_F(CommandLine, WrongUsageIs64) {
   EXPECT_EQ(run("check a.yaml b.yaml").code, 64);
   EXPECT_EQ(run("check a.yaml --no-such-option").code, 64);
   EXPECT_EQ(run("check a.yaml --template").code, 64);
+  EXPECT_EQ(run("check a.yaml --schema").code, 64);
 }
 
 TEST_F(CommandLine, WrongConfigurationIs78) {
@@ -81,9 +82,16 @@ TEST_F(CommandLine, CheckPrintsWhatLoadsAgain) {
   EXPECT_EQ(run("check --template").out, file_text(kConfigFolder / "template.yaml"));
 }
 
+TEST_F(CommandLine, SchemaIsWhatIsShipped) {
+  const Outcome schema = run("check --schema");
+  EXPECT_EQ(schema.code, 0);
+  EXPECT_EQ(schema.out, file_text(kConfigFolder / "experiment.schema.json"));
+}
+
 TEST_F(CommandLine, FullDiskIsAnError) {
   if (!std::filesystem::exists("/dev/full")) GTEST_SKIP() << "no /dev/full here";
   EXPECT_EQ(run("check --template", "/dev/full").code, 1);
+  EXPECT_EQ(run("check --schema", "/dev/full").code, 1);
 }
 
 }  // namespace

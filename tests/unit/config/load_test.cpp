@@ -49,6 +49,47 @@ TEST(Template, IsUpToDate) {
       << "softarm check --template > config/template.yaml";
 }
 
+TEST(Schema, IsUpToDate) {
+  EXPECT_EQ(file_text(kConfigFolder / "experiment.schema.json"), schema_text())
+      << "softarm check --schema > config/experiment.schema.json";
+}
+
+/// The template documents what is derived where a key is left out or 0 (resolve_thresholds).
+TEST(Template, NamesEveryTermOfDerivedThresholds) {
+  const std::string text = std::regex_replace(template_text(), std::regex("\n *#"), "");
+  EXPECT_NE(text.find("max(3 T, 3 frame_period_s + frame_latency_s), T = 1/rate_hz"),
+            std::string::npos);
+  EXPECT_NE(text.find("max(0.1 s, 10 frame_period_s, 3 T)"), std::string::npos);
+}
+
+/// Without its line a key that is marked as required is missed, and no other.
+TEST(Template, MarksWhatIsRequired) {
+  std::vector<std::string> lines;
+  std::istringstream stream(template_text());
+  for (std::string line; std::getline(stream, line);) lines.push_back(line);
+  const auto is_comment = [](const std::string& line) {
+    return line.find_first_not_of(' ') == line.find('#') && !line.empty();
+  };
+  const TestFolder folder;
+  int required = 0;
+  for (std::size_t i = 1; i < lines.size(); ++i) {
+    const bool one_line =
+        lines[i].find(": ") != std::string::npos && lines[i].find("- ") == std::string::npos;
+    if (is_comment(lines[i]) || !one_line || !is_comment(lines[i - 1])) continue;
+    std::string without;
+    for (std::size_t j = 0; j < lines.size(); ++j) without += j == i ? "\n" : lines[j] + "\n";
+    bool missed = false;
+    try {
+      load_experiment(folder.write("e.yaml", without));
+    } catch (const ConfigError& error) {
+      missed = std::string(error.what()).find("missing") != std::string::npos;
+    }
+    EXPECT_EQ(missed, lines[i - 1].ends_with("required)")) << lines[i];
+    if (missed) ++required;
+  }
+  EXPECT_GE(required, 9);
+}
+
 /// Hints in the template are in force once their "# " is taken away.
 TEST(Template, HintsLoadWhenUncommented) {
   const std::string text = std::regex_replace(
@@ -85,7 +126,7 @@ TEST(PaperArm, IsThatOfSectionVII) {
   EXPECT_NEAR(e.plant.mocap.orientation_noise_rad, 0.2 * kPi / 180.0, 1e-18);
   EXPECT_EQ(e.plant.arm.mass, MassModel::distributed);
   ASSERT_EQ(e.reference.phases.size(), 1u);
-  const auto& paper = std::get<PaperReference>(e.reference.phases[0].kind);
+  const auto& paper = *e.reference.phases[0].kind.get_if<PaperReference>();
   EXPECT_EQ(paper.theta_rad, 0.4);
   EXPECT_EQ(paper.phase_step_rad, kPi / 3.0);
 }
@@ -127,7 +168,7 @@ TEST(Load, FormsOfValues) {
   EXPECT_EQ(e.arm.segments[1].length_m, 0.12);
   EXPECT_EQ(e.control.kp, (std::vector<double>{1.0, 1.0, 1.0, 0.5}));
   EXPECT_EQ(e.arm.base_position_m, Eigen::Vector3d(0.0, 0.0, 1.0));
-  const auto& u = std::get<SetPointReference>(e.reference.phases[0].kind).u_rad;
+  const auto& u = e.reference.phases[0].kind.get_if<SetPointReference>()->u_rad;
   EXPECT_DOUBLE_EQ(u[0], 0.3);
   EXPECT_DOUBLE_EQ(u[2], -0.3);
   EXPECT_NEAR(u[3], 0.0, 1e-16);
@@ -202,8 +243,9 @@ TEST(RoundTrip, RandomExperiments) {
     e.plant.actuation = e.actuation;
     e.plant.arm.base_rotation = e.arm.base_rotation;
     e.plant.arm.segments[0].mass_kg = 1e-9 * unit(random);
-    for (double& u : std::get<SetPointReference>(e.reference.phases[0].kind).u_rad)
-      u = -unit(random);
+    SetPointReference hold = *e.reference.phases[0].kind.get_if<SetPointReference>();
+    for (double& u : hold.u_rad) u = -unit(random);
+    e.reference.phases[0].kind = hold;
     e.plant.initial_u_rad.setConstant(unit(random));
     e.transport.bodies.base_id = -1;
     e.realtime.cpu = 1;
@@ -213,8 +255,8 @@ TEST(RoundTrip, RandomExperiments) {
     EXPECT_EQ(e.arm.base_rotation, again.arm.base_rotation);
     EXPECT_EQ(e.control.kp, again.control.kp);
     EXPECT_EQ(e.arm.segments[1].damping_nms_per_rad, again.arm.segments[1].damping_nms_per_rad);
-    EXPECT_EQ(std::get<SetPointReference>(e.reference.phases[0].kind).u_rad,
-              std::get<SetPointReference>(again.reference.phases[0].kind).u_rad);
+    EXPECT_EQ(e.reference.phases[0].kind.get_if<SetPointReference>()->u_rad,
+              again.reference.phases[0].kind.get_if<SetPointReference>()->u_rad);
     EXPECT_EQ(again.transport.bodies.base_id, -1);
     EXPECT_EQ(again.realtime.cpu, 1);
   }

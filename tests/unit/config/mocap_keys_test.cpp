@@ -35,13 +35,13 @@ class MocapKeys : public ::testing::Test {
 
 TEST_F(MocapKeys, LeftOutMeanOurOwnFrames) {
   const TransportSettings transport = load("").transport;
-  EXPECT_EQ(transport.mocap.source, MocapSourceKind::softarm);
+  EXPECT_EQ(transport.mocap.source, softarm_mocap());
   EXPECT_EQ(transport.mocap.unit, LengthUnit::metre);
   EXPECT_EQ(transport.mocap.quaternion, QuaternionOrder::wxyz);
   EXPECT_EQ(transport.mocap.axes, Eigen::Matrix3d::Identity());
   EXPECT_EQ(transport.lcm.mocap_channel, "SOFTARM_MOCAP");
   ASSERT_EQ(transport.bodies.segment_plates.size(), 2U);
-  EXPECT_EQ(transport.bodies.segment_plates[1], PlateSettings{});
+  EXPECT_EQ(transport.bodies.segment_plates[1], MarkerFrameSettings{});
 }
 
 TEST_F(MocapKeys, ASourceBringsItsDefaults) {

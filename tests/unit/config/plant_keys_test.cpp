@@ -36,8 +36,9 @@ TEST(PlantKeys, AreReadAndWhatIsPrintedReadsTheSame) {
   EXPECT_EQ(plant.actuation.segments.size(), 2u);
   EXPECT_EQ(plant.valves.supply_pressure_bar, 20.0);
   EXPECT_EQ(plant.actuation.min_pressure_bar, -20.0);
-  EXPECT_EQ(plant.kind, PlantKind::links);
-  EXPECT_EQ(plant.links.joint_stiffness_nm_per_rad, 12.0);
+  const auto* links = plant.kind.get_if<LinkSettings>();
+  ASSERT_NE(links, nullptr);
+  EXPECT_EQ(links->joint_stiffness_nm_per_rad, 12.0);
   EXPECT_EQ(plant.method, IntegratorMethod::sdirk2);
   EXPECT_EQ(plant.valves.dead_time_s, 0.01);
   ASSERT_EQ(plant.loads.size(), 2u);
@@ -66,6 +67,8 @@ TEST(PlantKeys, TorqueIsForSimulatedArmsAlone) {
       "plant.actuation");
   refuses("plant: {kind: linsk}\n", "plant.kind");
   refuses("plant: {loads: [{segment: 3}]}\n", "plant.loads[0].segment");
+  refuses("plant: {integrator: ida}\n", "one of sdirk2, cash4, sdirk4, erk, cvode_bdf");
+  refuses("plant: {links: {joints: polar}}\n", "one of crossed");
   refuses("plant: {refined: {pieces: 2, mass_weights: [1, 2, 3]}}\n", "plant.refined.mass_weights");
 }
 

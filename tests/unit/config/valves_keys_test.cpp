@@ -50,7 +50,7 @@ TEST_F(ValvesKeys, ChoosingATerminalChoosesItsRegisters) {
   EXPECT_EQ(again.hash, first.hash);
 }
 
-// A program of one's own knows its own back ends, and what they need.
+// Another program may have back ends that this one does not know.
 TEST_F(ValvesKeys, AnotherBackEndNeedsNoRegisters) {
   const Experiment board = load(
       "valves: {backend: serial_board, device: /dev/ttyACM0, failsafe_timeout_s: 0.05, terminal: "

@@ -7,6 +7,7 @@
 #include <complex>
 #include <deque>
 
+#include "softarm/model/statics.hpp"
 #include "unit/control/arms.hpp"
 
 namespace softarm {

@@ -244,7 +244,8 @@ TEST(Reference, RefusesWhatDoesNotFit) {
   };
   EXPECT_EQ(refused(sequence()), "");
   EXPECT_NE(refused({}), "");
-  EXPECT_NE(refused(sequence(), 3).find("phase 1: expected u of 6 numbers"), std::string::npos);
+  EXPECT_NE(refused(sequence(), 3).find("reference[0]: expected u of 6 numbers"),
+            std::string::npos);
   EXPECT_NE(refused(sequence(), 0), "");
   EXPECT_NE(refused(sequence(), 65), "");
   EXPECT_NE(refused(one(SetPointReference{{3.0, 0.0, 0.0, 0.0}})).find("max_theta"),
@@ -255,7 +256,8 @@ TEST(Reference, RefusesWhatDoesNotFit) {
   EXPECT_NE(refused(one(fast)).find("max_speed"), std::string::npos);
   WayPointReference bad = way();
   bad.points[1].time_s = 0.2;
-  EXPECT_NE(refused(one(bad)).find("way point 2"), std::string::npos);
+  EXPECT_NE(refused(one(bad)).find("reference[0].points[1].time_s: expected later"),
+            std::string::npos);
   bad = way();
   bad.repeat = true;
   EXPECT_NE(refused(one(bad)).find("equal the first"), std::string::npos);

@@ -10,7 +10,6 @@
 #include "counted_malloc.hpp"
 #include "softarm/control/inverse_kinematics.hpp"
 #include "softarm/control/reference.hpp"
-#include "softarm/control/task_space_path.hpp"
 #include "softarm/model/kinematics.hpp"
 #include "unit/control/arms.hpp"
 
@@ -101,7 +100,7 @@ class ExactArm {
 
 TEST(TipPath, DefaultIsTheLemniscateOf22) {
   for (double t = 0.0; t < 12.0; t += 0.37) {
-    const TipReference at = evaluate(TipPathReference{}, t);
+    const TipReference at = TipPathReference{}.tip(t);
     EXPECT_NEAR(at.position_m.x(), -0.25, 1e-15);
     EXPECT_NEAR(at.position_m.y(), std::cos(pi * t / 5.0) / 3.0, 1e-14);
     EXPECT_NEAR(at.position_m.z(), -0.5 + std::sin(2.0 * pi * t / 5.0) / 6.0, 1e-14);
@@ -114,8 +113,7 @@ TEST(TipPath, DerivativesAreThoseOfThePosition) {
        {TipPathShape::point, TipPathShape::circle, TipPathShape::lemniscate}) {
     TipPathReference path{shape, {0.1, 0.2, -0.4}, {0.3, 0.1, 0.0}, {0.0, 0.1, 0.2}, 1.7};
     for (double t = 0.1; t < 5.0; t += 0.31) {
-      const TipReference a = evaluate(path, t - kShort), m = evaluate(path, t),
-                         b = evaluate(path, t + kShort);
+      const TipReference a = path.tip(t - kShort), m = path.tip(t), b = path.tip(t + kShort);
       EXPECT_LT((m.velocity_mps - (b.position_m - a.position_m) / (2.0 * kShort)).norm(), 1e-7);
       EXPECT_LT((m.acceleration_mps2 - (b.velocity_mps - a.velocity_mps) / (2.0 * kShort)).norm(),
                 1e-6);

@@ -6,6 +6,9 @@
 #include <cmath>
 #include <limits>
 #include <random>
+#include <vector>
+
+#include "softarm/base/time.hpp"
 
 namespace softarm {
 namespace {
@@ -25,8 +28,7 @@ struct Network {
   }
   std::int64_t arrival_ns(std::int64_t true_ns) {
     std::exponential_distribution<double> jitter(1.0 / jitter_s);
-    last_arrival_ns = std::max(
-        last_arrival_ns, true_ns + latency_ns + static_cast<std::int64_t>(1e9 * jitter(random)));
+    last_arrival_ns = std::max(last_arrival_ns, true_ns + latency_ns + to_ns(jitter(random)));
     return last_arrival_ns;
   }
 };
@@ -56,7 +58,7 @@ TEST(ClockRelation, AJumpOfTheSendersClockDoesNoHarm) {
     ClockRelation relation(ClockMode::sender, 5e-3);
     double worst_s = 0.0;
     for (std::int64_t k = 0; k < 4000; ++k) {
-      if (k == 2000) network.ahead_ns += std::llround(1e9 * jump_s);
+      if (k == 2000) network.ahead_ns += to_ns(jump_s);
       const std::int64_t captured = k * 5'000'000;
       const std::int64_t arrival = network.arrival_ns(captured);
       const std::int64_t told = relation.capture_ns(arrival, network.stamp_us(captured));
@@ -111,6 +113,24 @@ TEST(ClockRelation, RefusesANegativeLatency) {
   EXPECT_THROW(ClockRelation(ClockMode::sender, -1e-3), std::invalid_argument);
   EXPECT_THROW(ClockRelation(ClockMode::sender, std::numeric_limits<double>::quiet_NaN()),
                std::invalid_argument);
+}
+
+TEST(ClockRelation, TheOriginOfOurClockDoesNotMatter) {
+  const auto captures_from = [](std::int64_t start_ns) {
+    Network network;
+    ClockRelation relation(ClockMode::sender, 5e-3);
+    std::vector<std::int64_t> captures;
+    for (std::int64_t k = 0; k < 2000; ++k) {
+      const std::int64_t captured = k * 5'000'000;
+      captures.push_back(
+          relation.capture_ns(start_ns + network.arrival_ns(captured), network.stamp_us(captured)) -
+          start_ns);
+    }
+    return captures;
+  };
+  const std::vector<std::int64_t> expected = captures_from(0);
+  for (const std::int64_t start_s : {-1'000'000, -12, -4, 2, 1'000'000})  // whole windows of 2 s
+    EXPECT_TRUE(captures_from(start_s * 1'000'000'000) == expected) << start_s;
 }
 
 }  // namespace

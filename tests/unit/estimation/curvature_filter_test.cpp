@@ -7,12 +7,12 @@
 #include <numbers>
 #include <random>
 
+#include "softarm/base/time.hpp"
+
 namespace softarm {
 namespace {
 
 constexpr double kBandwidth = 30.0;
-
-std::int64_t ns(double s) { return std::llround(1e9 * s); }
 
 EstimationSettings settings_of(double bandwidth = kBandwidth) {
   EstimationSettings settings;
@@ -86,11 +86,11 @@ TEST(CurvatureFilter, IsTheWeightedFitOfAllMeasurements) {
   std::normal_distribution<double> noise;
   std::vector<double> t, y;
   for (const double time : irregular_times(0.6, 2)) {
-    t.push_back(1e-9 * static_cast<double>(ns(time)));
+    t.push_back(to_seconds(to_ns(time)));
     y.push_back(std::sin(4.0 * time) + 0.05 * noise(random));
-    filter.update(ns(time), estimate_of(y.back(), -y.back()));
+    filter.update(to_ns(time), estimate_of(y.back(), -y.back()));
     FilteredMotion motion;
-    filter.predict(ns(time) + ns(0.008), motion);
+    filter.predict(to_ns(time) + to_ns(0.008), motion);
     const BruteFit fit = brute_fit(t, y, t.back() + 0.008);
     ASSERT_TRUE(motion.valid[0]);
     EXPECT_NEAR(motion.u_rad[0], static_cast<double>(fit.u), 2e-6) << "after " << t.size();
@@ -111,12 +111,12 @@ Errors track(const std::vector<double>& times, double from,
   for (const double time : times) {
     const auto [u, velocity, acceleration] = truth(time);
     const KnownMotion known = known_of(u, velocity, acceleration);
-    filter.update(ns(time), estimate_of(u), with_known ? &known : nullptr);
+    filter.update(to_ns(time), estimate_of(u), with_known ? &known : nullptr);
     if (time < from) continue;
     const auto later = truth(time + 0.007);
     const KnownMotion known_later = known_of(later[0], later[1], later[2]);
     FilteredMotion motion;
-    filter.predict(ns(time + 0.007), motion, with_known ? &known_later : nullptr);
+    filter.predict(to_ns(time + 0.007), motion, with_known ? &known_later : nullptr);
     errors.u = std::max(errors.u, std::abs(motion.u_rad[0] - later[0]));
     errors.velocity = std::max(errors.velocity, std::abs(motion.velocity_radps[0] - later[1]));
   }
@@ -139,8 +139,8 @@ TEST(CurvatureFilter, LagBehindAJerkIsAsDocumented) {
   const double jerk = 12.0;
   const auto u = [&](double t) { return jerk * t * t * t / 6.0; };
   FilteredMotion motion;
-  for (int k = 0; k <= 20000; ++k) filter.update(ns(1e-4 * k), estimate_of(u(1e-4 * k)));
-  filter.predict(ns(2.0), motion);
+  for (int k = 0; k <= 20000; ++k) filter.update(to_ns(1e-4 * k), estimate_of(u(1e-4 * k)));
+  filter.predict(to_ns(2.0), motion);
   const double w = kBandwidth;
   EXPECT_NEAR((u(2.0) - motion.u_rad[0]) / (jerk / (w * w * w)), 1.0, 0.02);
   EXPECT_NEAR((jerk * 2.0 - motion.velocity_radps[0]) / (3.0 * jerk / (w * w)), 1.0, 0.02);
@@ -180,14 +180,14 @@ TEST(CurvatureFilter, ChangingTheKnownMotionCarriesTheMemoryOver) {
   for (int k = 0; k < 600; ++k) {
     const double t = 0.005 * k;
     const CurvatureEstimate estimate = estimate_of(std::sin(2.0 * t) + 0.005 * noise(random));
-    plain.update(ns(t), estimate);
+    plain.update(to_ns(t), estimate);
     const std::uint32_t source = static_cast<std::uint32_t>(k / 40) % 4;
     const KnownMotion known = source == 1 ? known_of(5.0 - 3.0 * t, -3.0, 0.0, 1)
                                           : known_of(t * t - 9.0, 2.0 * t, 2.0, source);
-    changing.update(ns(t), estimate, source == 0 ? nullptr : &known);
+    changing.update(to_ns(t), estimate, source == 0 ? nullptr : &known);
     FilteredMotion one, other;
-    plain.predict(ns(t + 0.006), one);
-    changing.predict(ns(t + 0.006), other);  // carries the known motion on by itself
+    plain.predict(to_ns(t + 0.006), one);
+    changing.predict(to_ns(t + 0.006), other);  // carries the known motion on by itself
     worst_u = std::max(worst_u, std::abs(one.u_rad[0] - other.u_rad[0]));
     worst_velocity =
         std::max(worst_velocity, std::abs(one.velocity_radps[0] - other.velocity_radps[0]));
@@ -208,9 +208,9 @@ TEST(CurvatureFilter, NoiseIsAsDocumented) {
     Eigen::Array2d sum = Eigen::Array2d::Zero();
     constexpr int kSamples = 60000;
     for (int k = 0; k < kSamples + 1000; ++k) {
-      filter.update(ns(c.period * k), estimate_of(noise(random), noise(random)));
+      filter.update(to_ns(c.period * k), estimate_of(noise(random), noise(random)));
       FilteredMotion motion;
-      filter.predict(ns(c.period * k + c.horizon), motion);
+      filter.predict(to_ns(c.period * k + c.horizon), motion);
       if (k < 1000) continue;
       sum[0] += motion.u_rad.squaredNorm() / (2.0 * kSamples);
       sum[1] += motion.velocity_radps.squaredNorm() / (2.0 * kSamples);
@@ -243,26 +243,26 @@ TEST(CurvatureFilter, StartsAtRestAndConverges) {
   FilteredMotion motion;
   filter.predict(0, motion);
   EXPECT_FALSE(motion.all_valid());
-  filter.update(ns(1.0), estimate_of(0.2));
-  filter.predict(ns(1.01), motion);
+  filter.update(to_ns(1.0), estimate_of(0.2));
+  filter.predict(to_ns(1.01), motion);
   EXPECT_TRUE(motion.all_valid());
   EXPECT_DOUBLE_EQ(motion.u_rad[0], 0.2);
   EXPECT_DOUBLE_EQ(motion.velocity_radps[0], 0.0);
-  for (int k = 1; k <= 80; ++k) filter.update(ns(1.0 + 0.005 * k), estimate_of(0.2 + 0.005 * k));
-  filter.predict(ns(1.4), motion);
+  for (int k = 1; k <= 80; ++k) filter.update(to_ns(1.0 + 0.005 * k), estimate_of(0.2 + 0.005 * k));
+  filter.predict(to_ns(1.4), motion);
   EXPECT_NEAR(motion.u_rad[0], 0.6, 1e-4);
   EXPECT_NEAR(motion.velocity_radps[0], 1.0, 5e-3);
 }
 
 TEST(CurvatureFilter, IgnoresTimesThatDoNotAdvance) {
   CurvatureFilter filter(settings_of(), 1);
-  filter.update(ns(1.0), estimate_of(0.2));
-  filter.update(ns(1.0), estimate_of(0.9));
-  filter.update(ns(0.9), estimate_of(0.9));
+  filter.update(to_ns(1.0), estimate_of(0.2));
+  filter.update(to_ns(1.0), estimate_of(0.9));
+  filter.update(to_ns(0.9), estimate_of(0.9));
   FilteredMotion motion;
-  filter.predict(ns(1.0), motion);
+  filter.predict(to_ns(1.0), motion);
   EXPECT_DOUBLE_EQ(motion.u_rad[0], 0.2);
-  EXPECT_EQ(filter.newest_ns(), ns(1.0));
+  EXPECT_EQ(filter.newest_ns(), to_ns(1.0));
 }
 
 TEST(CurvatureFilter, PredictsAnOccludedSegmentForAFewFramesOnly) {
@@ -280,8 +280,8 @@ TEST(CurvatureFilter, PredictsAnOccludedSegmentForAFewFramesOnly) {
     both.valid[0] = true;
     both.valid[1] = second_seen;
     if (!second_seen) both.u_rad.tail<2>().setConstant(99.0);
-    filter.update(ns(0.005 * k), both);
-    filter.predict(ns(0.005 * k), motion);
+    filter.update(to_ns(0.005 * k), both);
+    filter.predict(to_ns(0.005 * k), motion);
     return 0.005 * k++;
   };
   for (int i = 0; i < 200; ++i) next(true);
@@ -305,18 +305,18 @@ TEST(CurvatureFilter, PredictsAnOccludedSegmentForAFewFramesOnly) {
 TEST(CurvatureFilter, StartsAnewAfterALongGapAndBoundsItsPrediction) {
   CurvatureFilter filter(settings_of(), 1);
   FilteredMotion motion, later;
-  for (int k = 0; k <= 200; ++k) filter.update(ns(0.005 * k), estimate_of(0.01 * k));
+  for (int k = 0; k <= 200; ++k) filter.update(to_ns(0.005 * k), estimate_of(0.01 * k));
   const double reach = filter.reset_gap_s() / 2.0;
-  filter.predict(ns(1.0 + reach), motion);
+  filter.predict(to_ns(1.0 + reach), motion);
   EXPECT_NEAR(motion.u_rad[0], 2.0 + 2.0 * reach, 1e-6);
-  filter.predict(ns(1000.0), later);
+  filter.predict(to_ns(1000.0), later);
   EXPECT_NEAR(later.u_rad[0], motion.u_rad[0], 1e-9);
-  filter.update(ns(1.01 + filter.reset_gap_s()), estimate_of(-0.7));
-  filter.predict(ns(1.02 + filter.reset_gap_s()), motion);
+  filter.update(to_ns(1.01 + filter.reset_gap_s()), estimate_of(-0.7));
+  filter.predict(to_ns(1.02 + filter.reset_gap_s()), motion);
   EXPECT_DOUBLE_EQ(motion.u_rad[0], -0.7);
   EXPECT_DOUBLE_EQ(motion.velocity_radps[0], 0.0);
   filter.reset();
-  filter.predict(ns(1.02), motion);
+  filter.predict(to_ns(1.02), motion);
   EXPECT_FALSE(motion.all_valid());
 }
 

@@ -221,10 +221,26 @@ TEST(FrameValidator, RefusesWrongTolerances) {
   }
 }
 
-TEST(FrameValidator, EveryVerdictHasAName) {
-  EXPECT_STREQ(verdict_name(FrameVerdict::accepted), "accepted");
-  EXPECT_STREQ(verdict_name(FrameVerdict::not_seen), "not_seen");
-  EXPECT_STREQ(verdict_name(static_cast<FrameVerdict>(77)), "unknown");
+TEST(FrameValidator, EveryVerdictIsCountedUnderItsName) {
+  const EstimationSettings settings;
+  const ArmParameters arm = arm_of(1);
+  FrameValidator validator(settings, arm, test::fixed_base_noise(settings, 1));
+  MocapFrame frame = frame_of(arm, Eigen::Vector2d(0.1, 0.2));
+  EXPECT_EQ(validator.accept(frame), FrameVerdict::accepted);
+  EXPECT_EQ(validator.accept(frame), FrameVerdict::repeated);
+  frame.segments = 2;
+  EXPECT_EQ(validator.accept(frame), FrameVerdict::wrong_size);
+  frame = frame_of(arm, Eigen::Vector2d(0.1, 0.2));
+  ++frame.frame_number;
+  frame.capture_ns += 5'000'000;
+  frame.body[1].orientation.coeffs() *= 2.0;
+  EXPECT_EQ(validator.accept(frame), FrameVerdict::bad_quaternion);
+  const FrameCounters& counters = validator.counters();
+  EXPECT_EQ(counters.accepted, 1);
+  EXPECT_EQ(counters.repeated, 1);
+  EXPECT_EQ(counters.wrong_size, 1);
+  EXPECT_EQ(counters.bad_quaternion, 1);
+  EXPECT_EQ(counters.rejected(), 2);
 }
 
 }  // namespace

@@ -17,8 +17,12 @@ TEST(PipelineAllocation, TenThousandTicksThroughAllModes) {
   Experiment experiment = test::paper_arm();
   experiment.reference.phases.insert(experiment.reference.phases.begin(),
                                      {LiveReference{.timeout_s = 0.2}, 1.0});
-  for (const ControlCoordinates coordinates : {ControlCoordinates::u, ControlCoordinates::polar}) {
+  using enum ControlCoordinates;
+  for (const auto& [coordinates, observer] : {std::pair(u, ObserverKind::kinematic),
+                                              {polar, ObserverKind::kinematic},
+                                              {u, ObserverKind::model}}) {
     experiment.control.coordinates = coordinates;
+    experiment.estimation.observer = observer;
     const auto bench = std::make_unique<PipelineBench>(experiment);
     LiveReferenceInput live;
     live.u = live.velocity = live.acceleration = SegmentVector::Zero(6);
@@ -34,9 +38,9 @@ TEST(PipelineAllocation, TenThousandTicksThroughAllModes) {
       // Every 2000 ticks: a silence of 20 frames, long enough for HOLD and VENT.
       bench->publishing = k % 2000 < 1900;
       if (k % 7 == 0) bench->input.reference = &live;
-      bench->input.disarm = k == 6000;
-      bench->input.arm = k == 6100;
-      bench->input.shutdown = k >= 9900;
+      bench->input.requests.disarm = k == 6000;
+      bench->input.requests.arm = k == 6100;
+      bench->input.requests.shutdown = k >= 9900;
       ++ticks_in[static_cast<std::size_t>(bench->tick().mode)];
     }
     EXPECT_EQ(test::thread_allocations - allocated, 0);

@@ -33,7 +33,8 @@ class Bench {
     if (measurements) input.newest_measurement_ns = input.now_ns;
     if (go) input.newest_go_ns = input.now_ns;
     const Mode mode = monitor.step(input);
-    input.arm = input.disarm = input.emergency_stop = input.sender_restarted = false;
+    input.requests.arm = input.requests.disarm = input.requests.emergency_stop =
+        input.sender_restarted = false;
     // Pressure is there after a while under control, and gone after a while of venting.
     ticks_in_mode = mode == last_mode ? ticks_in_mode + 1 : 0;
     last_mode = mode;
@@ -48,7 +49,7 @@ class Bench {
   void activate() {
     run(kGoodFrames + 1);
     if (!monitor.armed()) {
-      input.arm = true;
+      input.requests.arm = true;
       tick();
     }
     ASSERT_EQ(monitor.mode(), Mode::active) << name(monitor.reason());
@@ -87,9 +88,9 @@ const std::vector<Row>& rows() {
   const auto nothing = [](Bench&) {};
   static const std::vector<Row> kRows{
       {Reason::shutdown, Mode::vent, Clearance::never, false, 1,
-       [](Bench& b) { b.input.shutdown = true; }, nothing},
+       [](Bench& b) { b.input.requests.shutdown = true; }, nothing},
       {Reason::emergency_stop, Mode::fault, Clearance::disarm_then_arm, false, 1,
-       [](Bench& b) { b.input.emergency_stop = true; }, nothing},
+       [](Bench& b) { b.input.requests.emergency_stop = true; }, nothing},
       {Reason::valves_silent, Mode::fault, Clearance::disarm_then_arm, true, 52,
        [](Bench& b) { b.measurements = false; }, [](Bench& b) { b.measurements = true; }},
       {Reason::pressure_mismatch, Mode::fault, Clearance::disarm_then_arm, true, 1,
@@ -99,7 +100,7 @@ const std::vector<Row>& rows() {
        [](Bench& b) { b.input.curvature_mismatch = true; },
        [](Bench& b) { b.input.curvature_mismatch = false; }},
       {Reason::disarmed, Mode::vent, Clearance::arm, false, 1,
-       [](Bench& b) { b.input.disarm = true; }, nothing},
+       [](Bench& b) { b.input.requests.disarm = true; }, nothing},
       {Reason::deadman_released, Mode::vent, Clearance::arm, false, 102,
        [](Bench& b) { b.go = false; }, [](Bench& b) { b.go = true; }},
       {Reason::time_gap, Mode::vent, Clearance::good_frames, false, 1,
@@ -197,15 +198,15 @@ TEST_P(CauseTable, OnlyWhatMustClearItDoes) {
     if (alone) continue;
     EXPECT_FALSE(bench.monitor.armed());
 
-    bench.input.arm = true;
+    bench.input.requests.arm = true;
     const bool by_arm = row.clearance == Clearance::good_frames || row.clearance == Clearance::arm;
     EXPECT_EQ(bench.run(2) == Mode::active, by_arm);
     if (by_arm) continue;
     EXPECT_FALSE(bench.monitor.armed()) << "an arm must not be stored up";
 
-    bench.input.disarm = true;
+    bench.input.requests.disarm = true;
     EXPECT_EQ(bench.run(400), row.clearance == Clearance::never ? row.mode : Mode::vent);
-    bench.input.arm = true;
+    bench.input.requests.arm = true;
     EXPECT_EQ(bench.run(2) == Mode::active, row.clearance == Clearance::disarm_then_arm);
   }
 }
@@ -255,10 +256,10 @@ TEST(CauseTableInCode, AnEmergencyStopIsToldEvenAfterAnotherFault) {
   bench.activate();
   bench.input.pressure_mismatch = true;
   ASSERT_EQ(bench.tick(), Mode::fault);
-  bench.input.emergency_stop = true;
+  bench.input.requests.emergency_stop = true;
   EXPECT_EQ(bench.tick(), Mode::fault);
   EXPECT_EQ(bench.monitor.reason(), Reason::emergency_stop);
-  bench.input.disarm = bench.input.emergency_stop = true;
+  bench.input.requests.disarm = bench.input.requests.emergency_stop = true;
   EXPECT_EQ(bench.tick(), Mode::fault) << "of two people the one who wants it stopped is right";
 }
 
@@ -267,14 +268,14 @@ TEST(CauseTableInCode, AFaultIsNotAcknowledgedWhileItLasts) {
   bench.activate();
   bench.input.pressure_mismatch = true;
   ASSERT_EQ(bench.tick(), Mode::fault);
-  bench.input.disarm = true;
+  bench.input.requests.disarm = true;
   EXPECT_EQ(bench.tick(), Mode::fault) << "there is still pressure";
   bench.run(200);  // vented by now: nothing may have pressure any more, and nobody can tell
-  bench.input.disarm = true;
+  bench.input.requests.disarm = true;
   EXPECT_EQ(bench.tick(), Mode::vent);
   bench.run(100);
   EXPECT_EQ(bench.monitor.reason(), Reason::pressure_mismatch);
-  bench.input.arm = true;
+  bench.input.requests.arm = true;
   EXPECT_EQ(bench.run(100), Mode::vent) << "not armed while pressures do not follow";
 }
 

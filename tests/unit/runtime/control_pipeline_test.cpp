@@ -4,8 +4,11 @@
 
 #include <gtest/gtest.h>
 
+#include <bit>
 #include <cstring>
+#include <vector>
 
+#include "softarm/estimation/model_observer.hpp"
 #include "softarm/runtime/settings.hpp"
 #include "unit/runtime/pipeline_bench.hpp"
 
@@ -220,7 +223,7 @@ TEST_F(Pipeline, AfterAStallThatOutlivedACommandTheArmIsVentedAndDisarmed) {
   explicitly.safety.vent_after_s = 0.5;
   PipelineBench bench(explicitly);
   bench.run(200);
-  bench.input.arm = true;
+  bench.input.requests.arm = true;
   ASSERT_GT(bench.run_to(Mode::active), 0);
   bench.now_ns += 140 * kMs;
   bench.next_capture_ns = bench.now_ns;
@@ -270,6 +273,37 @@ TEST_F(Pipeline, AfterVentTheReferenceIsJoinedFromWhereTheArmIs) {
   bench.publishing = true;
   ASSERT_GT(bench.run_to(Mode::active), 0);
   EXPECT_LT((bench.pipeline.output().reference.u - bench.u).norm(), 0.02);
+}
+
+TEST_F(Pipeline, WithTheModelObserverMotionIsItsOwn) {
+  Experiment modelled = experiment;
+  modelled.estimation.observer = ObserverKind::model;
+  PipelineBench observed(modelled);
+  ASSERT_GT(observed.run_to(Mode::active), 0);
+  observed.run(500);
+  const TickOutput& output = observed.pipeline.output();
+  ASSERT_NE(output.observer, nullptr);
+  EXPECT_TRUE(output.motion.all_valid());
+  // The ideal arm of this bench obeys no law of motion, so the observer finds a disturbance; it
+  // follows all the same.
+  EXPECT_LT((output.motion.u_rad - observed.u).norm(), 0.02);
+  EXPECT_TRUE(output.observer->correction().disturbance_nm.allFinite());
+}
+
+TEST_F(Pipeline, WhereTheModelCannotBeFactoredTheKinematicFilterServes) {
+  Experiment impossible = experiment;
+  impossible.estimation.observer = ObserverKind::model;
+  impossible.arm.segments[1].stiffness_nm_per_rad = -1e6;  // no arm: B + ... + g^2 h^2 K indefinite
+  PipelineBench broken(impossible);
+  ASSERT_GT(broken.run_to(Mode::active), 0);
+  int fell_back = 0;
+  for (int k = 0; k < 200; ++k) {
+    const TickOutput& output = broken.tick();
+    ASSERT_EQ(output.mode, Mode::active);
+    EXPECT_TRUE(output.motion.all_valid());
+    fell_back += output.observer == nullptr ? 1 : 0;
+  }
+  EXPECT_GT(fell_back, 50);
 }
 
 class LiveReferenceInPipeline : public Pipeline {
@@ -330,6 +364,31 @@ TEST_F(LiveReferenceInPipeline, BeforeActiveAndInHoldItIsIgnored) {
   message.u.setConstant(1.0);
   bench.input.reference = &message;
   EXPECT_FALSE(bench.tick().reference_limited);
+}
+
+// No instant of the clock is a special one: a capture at zero is not "never".
+TEST_F(Pipeline, TheOriginOfTimeDoesNotMatter) {
+  const auto run_from = [&](std::int64_t start_ns) {
+    PipelineBench bench(experiment);
+    bench.now_ns = bench.next_capture_ns = start_ns;
+    bench.sent_ns = start_ns - 1000 * kMs;
+    std::vector<std::uint64_t> said;
+    const auto add = [&said](double value) { said.push_back(std::bit_cast<std::uint64_t>(value)); };
+    for (int k = 0; k < 700; ++k) {
+      bench.publishing = k < 400 || k > 500;  // HOLD, VENT and back
+      const TickOutput& output = bench.tick();
+      said.push_back(static_cast<std::uint64_t>(output.mode));
+      said.push_back(static_cast<std::uint64_t>(output.reason));
+      add(output.frame_age_s);
+      for (const double each : output.pressure_bar) add(each);
+      for (const double each : output.motion.u_rad) add(each);
+    }
+    return said;
+  };
+  const std::vector<std::uint64_t> expected = run_from(1000 * kMs);
+  // Whole periods of ticks and frames: zero is one of the captures.
+  for (const std::int64_t start_ns : {-10 * kMs, -500 * kMs, -820 * kMs, std::int64_t{0}})
+    EXPECT_TRUE(run_from(start_ns) == expected) << start_ns;
 }
 
 }  // namespace

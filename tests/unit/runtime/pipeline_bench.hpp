@@ -8,6 +8,7 @@
 #include <functional>
 #include <span>
 
+#include "softarm/base/time.hpp"
 #include "softarm/config/load.hpp"
 #include "softarm/model/kinematics.hpp"
 #include "softarm/runtime/control_pipeline.hpp"
@@ -27,7 +28,7 @@ class PipelineBench {
       : arm(experiment.arm),
         pipeline(experiment),
         u(SegmentVector::Zero(arm.dof())),
-        validity_ns(std::llround(1e9 * experiment.safety.command_validity_s)) {}
+        validity_ns(to_ns(experiment.safety.command_validity_s)) {}
 
   /// One period: the arm moves, motion capture looks, the pipeline acts.
   const TickOutput& tick() {
@@ -42,7 +43,7 @@ class PipelineBench {
     if (valves_publish) publish_pressures();
     if (going) input.newest_go_ns = now_ns;
     const TickOutput& output = pipeline.tick(input);
-    input.arm = input.disarm = input.emergency_stop = false;
+    input.requests.arm = input.requests.disarm = input.requests.emergency_stop = false;
     input.reference = nullptr;
     input.measured_bar = nullptr;
     return output;
@@ -124,7 +125,7 @@ class PipelineBench {
   void publish_pressures() {
     const PressureVector& commanded = pipeline.output().pressure_bar;
     if (real_bar.size() == 0) real_bar = PressureVector::Zero(commanded.size());
-    const double part = 1.0 - std::exp(-1e-9 * static_cast<double>(pipeline.period_ns()) / 0.01);
+    const double part = 1.0 - std::exp(-to_seconds(pipeline.period_ns()) / 0.01);
     real_bar += part * (commanded - real_bar);
     measured_bar = real_bar;
     if (leak) leak(measured_bar);

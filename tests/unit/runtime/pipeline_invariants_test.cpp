@@ -6,6 +6,7 @@
 #include <array>
 #include <set>
 
+#include "softarm/base/time.hpp"
 #include "softarm/runtime/settings.hpp"
 #include "unit/runtime/pipeline_bench.hpp"
 #include "unit/runtime/random_faults.hpp"
@@ -26,7 +27,7 @@ class Promises {
       : bench_(bench),
         limits_(experiment),
         thresholds_(resolve_thresholds(experiment.safety, 1.0 / experiment.rate_hz)) {
-    newest_.fill(SafetyInput::kNever);
+    newest_.fill(kNever);
   }
 
   /// Empty, or what was broken. To be called after each tick, with the operator's requests of it.
@@ -37,10 +38,8 @@ class Promises {
           newest_[i] = std::max(newest_[i], frame.capture_ns);
     const std::int64_t oldest = *std::min_element(newest_.begin(), newest_.end());
     // Bad numbers may stand in a frame; the age is a lower bound of what the daemon may go by.
-    const bool fresh =
-        oldest != SafetyInput::kNever && bench_.now_ns - oldest <= thresholds_.hold_after_ns;
-    const bool stale =
-        oldest == SafetyInput::kNever || bench_.now_ns - oldest > thresholds_.vent_after_ns;
+    const bool fresh = oldest != kNever && bench_.now_ns - oldest <= thresholds_.hold_after_ns;
+    const bool stale = oldest == kNever || bench_.now_ns - oldest > thresholds_.vent_after_ns;
     const Mode mode = output.mode;
 
     const bool expired = bench_.input.command_expired;
@@ -103,7 +102,8 @@ TEST(PipelineInvariants, HoldInEveryTickOfRandomSequences) {
     const auto tick = [&] {
       faults.before_tick();
       faults.others_before_tick();
-      const bool disarm = bench.input.disarm, emergency_stop = bench.input.emergency_stop;
+      const bool disarm = bench.input.requests.disarm,
+                 emergency_stop = bench.input.requests.emergency_stop;
       const TickOutput& output = bench.tick();
       modes.insert(output.mode);
       reasons.insert(output.reason);
@@ -111,7 +111,7 @@ TEST(PipelineInvariants, HoldInEveryTickOfRandomSequences) {
     };
     for (unsigned k = 0; k < 3000 + 71 * seed; ++k)
       ASSERT_EQ(tick(), "") << "seed " << seed << ", tick " << k;
-    bench.input.shutdown = true;
+    bench.input.requests.shutdown = true;
     for (int k = 0; k < vent_ticks + 2; ++k)
       ASSERT_EQ(tick(), "") << "seed " << seed << ", shutting down, tick " << k;
     for (int k = 0; k < 100; ++k) {
@@ -253,7 +253,7 @@ TEST_F(Watches, SoftLimitsOnAngleAndSpeedVentAndWaitForAnArm) {
     bench.moves = true;
     bench.run(1500);
     EXPECT_EQ(bench.pipeline.output().reason, Reason::waiting_for_arm);
-    bench.input.arm = true;
+    bench.input.requests.arm = true;
     EXPECT_EQ(bench.tick().mode, Mode::active);
   }
 }

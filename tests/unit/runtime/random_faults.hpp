@@ -18,14 +18,14 @@ class RandomFaults {
     if (chance(0.0005)) bench_.next_number -= 50;
     if (chance(0.0003)) bench_.now_ns += 150 * kMs;
     bench_.latency_ns = spell_ == 5 ? 70 * kMs : 5 * kMs;
-    bench_.input.arm = chance(0.005);
-    bench_.input.disarm = chance(0.0005);
+    bench_.input.requests.arm = chance(0.005);
+    bench_.input.requests.disarm = chance(0.0005);
   }
 
   /// What people, valves and the machine do beside the frames.
   void others_before_tick() {
-    bench_.input.disarm |= chance(0.002);  // a fault must be acknowledged now and then
-    bench_.input.emergency_stop = chance(0.0002);
+    bench_.input.requests.disarm |= chance(0.002);  // a fault must be acknowledged now and then
+    bench_.input.requests.emergency_stop = chance(0.0002);
     if (chance(0.002)) bench_.going = !bench_.going;
     if (!bench_.going && chance(0.02)) bench_.going = true;
     if (chance(0.001)) bench_.valves_publish = false;

@@ -5,6 +5,7 @@
 #include <functional>
 #include <random>
 
+#include "softarm/base/time.hpp"
 #include "softarm/runtime/settings.hpp"
 
 namespace softarm {
@@ -33,7 +34,7 @@ class Bench {
     if (frames_per_tick > 0) input.newest_capture_ns = input.now_ns - 5 * kMs;
     input.newest_measurement_ns = input.now_ns;
     const Mode mode = monitor.step(input);
-    input.arm = input.disarm = false;
+    input.requests.arm = input.requests.disarm = false;
     input.bad_frames = 0;
     input.sender_restarted = false;
     return mode;
@@ -85,7 +86,7 @@ TEST(SafetyMonitor, ExplicitArmingWaitsForTheOperator) {
   bench.input.fully_vented = true;
   EXPECT_EQ(bench.run(200), Mode::wait_frames);
   EXPECT_EQ(bench.monitor.reason(), Reason::waiting_for_arm);
-  bench.input.arm = true;
+  bench.input.requests.arm = true;
   EXPECT_EQ(bench.tick(), Mode::active);
 }
 
@@ -115,7 +116,7 @@ TEST(SafetyMonitor, ASoftLimitIsNotForgivenAutomatically) {
   bench.input.fully_vented = true;
   EXPECT_EQ(bench.run(1000), Mode::vent);
   EXPECT_EQ(bench.monitor.reason(), Reason::waiting_for_arm);
-  bench.input.arm = true;
+  bench.input.requests.arm = true;
   EXPECT_EQ(bench.tick(), Mode::active);
 }
 
@@ -123,7 +124,7 @@ TEST(SafetyMonitor, ArmingIsNotStoredUpForLater) {
   Bench bench(Arming::explicit_);
   bench.input.fully_vented = true;
   bench.frames_per_tick = 0;
-  bench.input.arm = true;
+  bench.input.requests.arm = true;
   bench.tick();
   bench.frames_per_tick = 1;
   EXPECT_EQ(bench.run(200), Mode::wait_frames) << "armed when nobody could see the arm";
@@ -138,7 +139,7 @@ TEST(SafetyMonitor, AnArmingThatWaitsForFramesIsTakenBackByWhatWouldVent) {
     Bench bench(Arming::explicit_);
     bench.input.fully_vented = true;
     bench.run(10);
-    bench.input.arm = true;
+    bench.input.requests.arm = true;
     bench.tick();
     ASSERT_TRUE(bench.monitor.armed());
     bench.frames_per_tick = 0;
@@ -156,16 +157,16 @@ TEST(SafetyMonitor, AnArmThatQueuedUpDuringAStopDoesNotCount) {
     Bench bench(arming);
     bench.input.fully_vented = true;
     bench.run(100);
-    bench.input.disarm = true;
+    bench.input.requests.disarm = true;
     bench.tick();
     bench.tick(4000 * kMs);
     for (int k = 0; k < 200; ++k) {  // 0.4 s of what is left in a socket
-      bench.input.arm = true;
+      bench.input.requests.arm = true;
       bench.tick();
     }
     EXPECT_FALSE(bench.monitor.armed());
     bench.run(100);
-    bench.input.arm = true;
+    bench.input.requests.arm = true;
     EXPECT_EQ(bench.tick(), Mode::active);
   }
 }
@@ -184,14 +185,14 @@ TEST(SafetyMonitor, VentTakesTheArmingBack) {
   Bench bench(Arming::explicit_);
   bench.input.fully_vented = true;
   bench.run(60);
-  bench.input.arm = true;
+  bench.input.requests.arm = true;
   ASSERT_EQ(bench.tick(), Mode::active);
   bench.input.sender_restarted = true;
   EXPECT_EQ(bench.tick(), Mode::vent);
   bench.input.fully_vented = true;
   EXPECT_EQ(bench.run(500), Mode::vent);
   EXPECT_EQ(bench.monitor.reason(), Reason::waiting_for_arm);
-  bench.input.arm = true;
+  bench.input.requests.arm = true;
   EXPECT_EQ(bench.tick(), Mode::active);
 }
 
@@ -207,10 +208,10 @@ TEST(SafetyMonitor, SilentValvesAreALatchedFault) {
   EXPECT_EQ(bench.monitor.step(bench.input), Mode::fault);
   bench.input.fully_vented = true;
   EXPECT_EQ(bench.run(1000), Mode::fault) << "a fault is latched";
-  bench.input.disarm = true;
+  bench.input.requests.disarm = true;
   EXPECT_EQ(bench.tick(), Mode::vent);
   EXPECT_EQ(bench.run(100), Mode::vent) << "disarmed";
-  bench.input.arm = true;
+  bench.input.requests.arm = true;
   EXPECT_EQ(bench.tick(), Mode::active);
 }
 
@@ -268,7 +269,7 @@ TEST(SafetyMonitor, TheMoreSevereCauseWins) {
   Bench bench;
   bench.activate();
   bench.input.poses_frozen = true;
-  bench.input.shutdown = true;
+  bench.input.requests.shutdown = true;
   EXPECT_EQ(bench.tick(), Mode::vent);
   EXPECT_EQ(bench.monitor.reason(), Reason::shutdown);
 }
@@ -293,12 +294,12 @@ TEST(SafetyMonitor, RandomSequencesNeverBreakTheInvariants) {
       if (chance(0.01)) bench.input.fully_vented = !bench.input.fully_vented;
       bench.input.poses_frozen = chance(0.005);
       bench.input.sender_restarted = chance(0.002);
-      bench.input.arm = chance(0.02);
-      bench.input.disarm = chance(0.002);
-      const bool disarm = bench.input.disarm;
+      bench.input.requests.arm = chance(0.02);
+      bench.input.requests.disarm = chance(0.002);
+      const bool disarm = bench.input.requests.disarm;
       const bool restarted = bench.input.sender_restarted;
       const Mode mode = bench.tick(chance(0.002) ? 200 * kMs : 2 * kMs);
-      const bool seen = bench.input.newest_capture_ns != SafetyInput::kNever;
+      const bool seen = bench.input.newest_capture_ns != kNever;
       const std::int64_t age =
           seen ? bench.input.now_ns - bench.input.newest_capture_ns : INT64_MAX;
       if (mode == Mode::active) {

@@ -12,6 +12,7 @@
 #include "softarm/model/actuation_matrix.hpp"
 #include "softarm/model/dynamics.hpp"
 #include "softarm/model/kinematics.hpp"
+#include "softarm/model/statics.hpp"
 #include "unit/simulation/paper_arm.hpp"
 
 namespace softarm {
@@ -25,13 +26,11 @@ VectorXd bent() {
   return u;
 }
 
-/// G + K u - force at rest, from the model room.
+/// K u + G(u) - force at rest, from the model.
 VectorXd static_residual(const ArmParameters& arm, const VectorXd& u, const VectorXd& force) {
   DynamicsWorkspace workspace(arm);
   VectorXd out(arm.dof());
-  const VectorXd zero = VectorXd::Zero(arm.dof());
-  inverse_dynamics(arm, workspace, u, zero, zero, zero, {}, out);
-  add_impedance(arm, u, zero, out);
+  static_moments(arm, workspace, u, out);
   return out - force;
 }
 
@@ -212,6 +211,9 @@ TEST(ArmPlant, CoupleActuationGoesThroughItsOwnMatrix) {
     force.segment<2>(2 * i) = a * tau;
   }
   EXPECT_LT(static_residual(settings.arm, u, force).lpNorm<Eigen::Infinity>(), 2e-5);
+  VectorXd tau(6);
+  for (int i = 0; i < 3; ++i) tau.segment<2>(2 * i) << -chambers[2 * i + 1], chambers[2 * i];
+  EXPECT_LT((rest_shape(settings.arm, tau).value() - u).norm(), 1e-4);
   EXPECT_GT(static_residual(settings.arm, u, chambers).norm(), 1e-3);
 }
 

@@ -1,4 +1,4 @@
-// The links against mechanics written down anew: points and directions in long double, differenced.
+// The links against mechanics by another route: points and directions in long double, differenced.
 #include "simulation/link_system.hpp"
 
 #include <gtest/gtest.h>
@@ -20,13 +20,16 @@ using VectorX = Eigen::Matrix<Real, Eigen::Dynamic, 1>;
 
 PlantSettings links(int segments, int per_segment, MassModel mass = MassModel::distributed) {
   PlantSettings settings = paper_arm(mass, segments);
-  settings.kind = PlantKind::links;
-  settings.links.links_per_segment = per_segment;
+  settings.kind = kLinks(per_segment);
   settings.arm.base_rotation =
       Eigen::AngleAxisd(0.7, Eigen::Vector3d(1.0, 2.0, -0.5).normalized()).toRotationMatrix();
   set_torque_actuation(settings.actuation, segments, 1e3);
   settings.valves.supply_pressure_bar = 1e3;
   return settings;
+}
+
+LinkSystem link_system(const PlantSettings& settings) {
+  return LinkSystem(settings, *settings.kind.get_if<LinkSettings>());
 }
 
 struct Chain {
@@ -37,13 +40,14 @@ struct Chain {
 
 /// Where every link is, in the world, by the definition of the joints alone.
 Chain chain(const PlantSettings& settings, const VectorX& x) {
+  const int per_segment = settings.kind.get_if<LinkSettings>()->links_per_segment;
   Chain result;
   const Matrix3 base = settings.arm.base_rotation.cast<Real>();
   Matrix3 rotation = base;
   Vector3 start = Vector3::Zero();
   for (Eigen::Index j = 0; 2 * j < x.size(); ++j) {
-    const auto i = static_cast<std::size_t>(j / settings.links.links_per_segment);
-    const Real length = Real(settings.arm.segments[i].length_m) / settings.links.links_per_segment;
+    const auto i = static_cast<std::size_t>(j / per_segment);
+    const Real length = Real(settings.arm.segments[i].length_m) / per_segment;
     rotation = rotation * Eigen::AngleAxis<Real>(x[2 * j], Vector3::UnitX()) *
                Eigen::AngleAxis<Real>(x[2 * j + 1], Vector3::UnitY());
     const Vector3 along = rotation.col(2);
@@ -82,7 +86,8 @@ VectorX inertia_less_weight(const PlantSettings& settings, const VectorX& x, con
   VectorX force = VectorX::Zero(x.size());
   const Vector3 gravity = settings.arm.gravity_mps2.cast<Real>();
   for (std::size_t j = 0; j < static_cast<std::size_t>(x.size() / 2); ++j) {
-    const auto m = static_cast<std::size_t>(settings.links.links_per_segment);
+    const auto m =
+        static_cast<std::size_t>(settings.kind.get_if<LinkSettings>()->links_per_segment);
     const SegmentParameters& segment = settings.arm.segments[j / m];
     const Real mass = Real(segment.mass_kg) / Real(m);
     const Real length = Real(segment.length_m) / Real(m);
@@ -118,7 +123,7 @@ INSTANTIATE_TEST_SUITE_P(Masses, Mechanics,
 
 TEST_P(Mechanics, ResidualIsNewtonsLawForEveryGrain) {
   const PlantSettings settings = links(2, 3, GetParam());
-  LinkSystem system(settings);
+  LinkSystem system = link_system(settings);
   const Eigen::Index n = system.size();
   const auto x = random_vector(n, 0.8, 1), v = random_vector(n, 3.0, 2),
              a = random_vector(n, 20, 3);
@@ -132,7 +137,7 @@ TEST_P(Mechanics, ResidualIsNewtonsLawForEveryGrain) {
 }
 
 TEST_P(Mechanics, InertiaIsWhatTheResidualAsksForUnitAccelerations) {
-  LinkSystem system(links(2, 4, GetParam()));
+  LinkSystem system = link_system(links(2, 4, GetParam()));
   const Eigen::Index n = system.size();
   const auto x = random_vector(n, 0.8, 4), v = random_vector(n, 3.0, 5);
   Eigen::MatrixXd B(n, n), by_v(n, n), by_x(n, n);
@@ -148,7 +153,7 @@ TEST_P(Mechanics, InertiaIsWhatTheResidualAsksForUnitAccelerations) {
 }
 
 TEST_P(Mechanics, AccelerationMakesTheResidualZero) {
-  LinkSystem system(links(3, 4, GetParam()));
+  LinkSystem system = link_system(links(3, 4, GetParam()));
   const Eigen::Index n = system.size();
   const auto x = random_vector(n, 0.5, 6), v = random_vector(n, 3.0, 7);
   Eigen::VectorXd a(n), residual(n), forces(n);
@@ -160,7 +165,7 @@ TEST_P(Mechanics, AccelerationMakesTheResidualZero) {
 
 TEST_P(Mechanics, LinearizationIsExactAtRest) {
   PlantSettings settings = links(2, 4, GetParam());
-  LinkSystem system(settings);
+  LinkSystem system = link_system(settings);
   const Eigen::Index n = system.size();
   const auto x = random_vector(n, 0.8, 8);
   const Eigen::VectorXd zero = Eigen::VectorXd::Zero(n);
@@ -181,12 +186,12 @@ TEST_P(Mechanics, LinearizationIsExactAtRest) {
 TEST_P(Mechanics, PowersAndEnergiesBelongTogether) {
   PlantSettings settings = links(2, 3, GetParam());
   settings.tip_force_n = {0.3, -0.2, 0.5};
-  LinkSystem system(settings);
+  LinkSystem system = link_system(settings);
   const Eigen::Index n = system.size();
   const Eigen::VectorXd force = random_vector(4, 1.0, 9);
   for (const ActuationModel model : {ActuationModel::chamber, ActuationModel::couple}) {
     settings.arm.actuation = model;
-    LinkSystem driven(settings);
+    LinkSystem driven = link_system(settings);
     driven.drive(0.0, force, force, 0.0);
     const auto x = random_vector(n, 0.6, 10), v = random_vector(n, 3.0, 11);
     Eigen::VectorXd a(n);
@@ -205,7 +210,7 @@ TEST_P(Mechanics, PowersAndEnergiesBelongTogether) {
 TEST(LinkSystem, CoupleDoesTheWorkOfAMomentOnTheSegmentsEnd) {
   PlantSettings settings = links(2, 3);
   settings.arm.actuation = ActuationModel::couple;
-  LinkSystem system(settings);
+  LinkSystem system = link_system(settings);
   const Eigen::Index n = system.size();
   const auto x = random_vector(n, 0.6, 12);
   const Eigen::VectorXd zero = Eigen::VectorXd::Zero(n);
@@ -238,7 +243,7 @@ TEST(LinkSystem, CoupleDoesTheWorkOfAMomentOnTheSegmentsEnd) {
 TEST(LinkSystem, UniformMomentHoldsAUniformBend) {
   PlantSettings settings = links(1, 6);
   settings.arm.gravity_mps2.setZero();
-  LinkSystem system(settings);
+  LinkSystem system = link_system(settings);
   const Eigen::Vector2d u(0.9, -1.4);
   const Eigen::Vector2d moment = 0.626 * u;
   system.drive(0.0, moment, moment, 0.0);
@@ -259,7 +264,7 @@ TEST(LinkSystem, UniformMomentHoldsAUniformBend) {
 
 TEST(LinkSystem, FittedCurvatureIsThatOfTheEndAndItsRateItsDerivative) {
   for (const double bend : {0.0, 0.4, 2.5, 4.0}) {
-    LinkSystem system(links(2, 6));
+    LinkSystem system = link_system(links(2, 6));
     Eigen::VectorXd x(24), v = random_vector(24, 1.0, 14);
     system.spread(Eigen::Vector4d(bend, 0.3 * bend, -bend, 0.2), x);
     x += random_vector(24, bend == 0.0 ? 0.0 : 0.02, 15);
@@ -302,15 +307,13 @@ TEST(PlantSystem, ManyPartsVibrateAsACantileverDoes) {
   const double expected = root * root *
                           std::sqrt(segment.stiffness_nm_per_rad /
                                     (segment.mass_kg * segment.length_m * segment.length_m));
-  const auto error = [&](PlantKind kind, int parts) {
-    settings.kind = kind;
-    settings.links.links_per_segment = settings.refined.pieces = parts;
-    return std::abs(lowest_frequency(*make_plant_system(settings)) / expected - 1.0);
+  const auto error = [&](MakeKind kind, int parts) {
+    return std::abs(lowest_frequency(*kind(parts).make(settings)) / expected - 1.0);
   };
-  EXPECT_LT(error(PlantKind::refined, 48), 1e-4);
-  EXPECT_NEAR(error(PlantKind::refined, 8) / error(PlantKind::refined, 16), 4.0, 0.3);
+  EXPECT_LT(error(kRefined, 48), 1e-4);
+  EXPECT_NEAR(error(kRefined, 8) / error(kRefined, 16), 4.0, 0.3);
   // Joints at the links' starts are half a link off their place: first order.
-  EXPECT_NEAR(error(PlantKind::links, 16) / error(PlantKind::links, 32), 2.0, 0.1);
+  EXPECT_NEAR(error(kLinks, 16) / error(kLinks, 32), 2.0, 0.1);
 }
 
 }  // namespace

@@ -6,6 +6,8 @@
 #include <stdexcept>
 #include <vector>
 
+#include "softarm/base/time.hpp"
+
 namespace softarm {
 namespace {
 
@@ -72,7 +74,7 @@ TEST(MocapSimulator, FramesArriveAfterTheLatencyInOrder) {
   MocapSimulator mocap(settings, 1, 1, kStart);
   const std::vector<Eigen::Isometry3d> ends{pose(0.1)};
   MocapFrame frame;
-  EXPECT_EQ(mocap.next_arrival_ns(), MocapSimulator::kNever);
+  EXPECT_EQ(mocap.next_arrival_ns(), kForever);
   std::int64_t received = 0;
   for (std::int64_t now = kStart; now < kStart + 100'000'000; now += 500'000) {
     if (now == mocap.next_capture_ns()) mocap.capture(pose(0.0), ends);

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "simulation/second_order_system.hpp"
+#include "softarm/simulation/second_order_system.hpp"
 
 namespace softarm {
 

@@ -25,6 +25,16 @@ inline PlantSettings paper_arm(MassModel mass = MassModel::distributed, int segm
   return settings;
 }
 
+/// The built-in kinds with `parts` a segment, where they have parts.
+using MakeKind = PlantKind (*)(int parts);
+inline constexpr MakeKind kPcc = [](int) -> PlantKind { return PccSettings{}; };
+inline constexpr MakeKind kRefined = [](int parts) -> PlantKind {
+  return RefinedSettings{.pieces = parts};
+};
+inline constexpr MakeKind kLinks = [](int parts) -> PlantKind {
+  return LinkSettings{.links_per_segment = parts};
+};
+
 /// A drive with steps every `hold_s`: the pressures at time t, smooth but for the holding.
 inline std::vector<double> drive_bar(double t_s, int segments = 3) {
   std::vector<double> pressures;

@@ -9,10 +9,9 @@
 namespace softarm {
 namespace {
 
-PlantSettings by_torque(PlantKind kind, int segments, int parts) {
+PlantSettings by_torque(MakeKind kind, int segments, int parts) {
   PlantSettings settings = paper_arm(MassModel::distributed, segments);
-  settings.kind = kind;
-  settings.refined.pieces = settings.links.links_per_segment = parts;
+  settings.kind = kind(parts);
   set_torque_actuation(settings.actuation, segments, 10.0);
   settings.valves.supply_pressure_bar = 10.0;
   return settings;
@@ -35,9 +34,8 @@ Eigen::VectorXd run(ArmPlant& plant, double duration_s, double hold_s = 1e-2) {
   return plant.u_rad();
 }
 
-class Kinds : public ::testing::TestWithParam<PlantKind> {};
-INSTANTIATE_TEST_SUITE_P(All, Kinds,
-                         ::testing::Values(PlantKind::pcc, PlantKind::refined, PlantKind::links));
+class Kinds : public ::testing::TestWithParam<MakeKind> {};
+INSTANTIATE_TEST_SUITE_P(All, Kinds, ::testing::Values(kPcc, kRefined, kLinks));
 
 TEST_P(Kinds, EnergyBalanceClosesOverADrivenRun) {
   for (const ActuationModel model : {ActuationModel::chamber, ActuationModel::couple}) {
@@ -99,15 +97,15 @@ TEST_P(Kinds, SegmentEndsAgreeWithTheTipAndTheFit) {
 }
 
 TEST(PlantKinds, OnePieceIsTheModel) {
-  ArmPlant pcc(by_torque(PlantKind::pcc, 3, 1));
-  ArmPlant refined(by_torque(PlantKind::refined, 3, 1));
+  ArmPlant pcc(by_torque(kPcc, 3, 1));
+  ArmPlant refined(by_torque(kRefined, 3, 1));
   EXPECT_EQ(run(pcc, 0.2), run(refined, 0.2));
 }
 
 TEST(PlantKinds, TorquesDoWhatChambersWithTheSameMomentsDo) {
   PlantSettings settings = paper_arm(MassModel::distributed, 2);
   ArmPlant chambers(settings);
-  ArmPlant torque(by_torque(PlantKind::pcc, 2, 1));
+  ArmPlant torque(by_torque(kPcc, 2, 1));
   const double gain = settings.actuation.segments[0][0].gain_nm_per_bar;
   // A chamber at chi adds -g p (cos chi, sin chi) to the force in u: tau_A = (g p sin, -g p cos).
   const std::vector<double> pressures = {0.3, 0.0, 0.0, 0.1, 0.0, 0.2, 0.4, 0.0};
@@ -117,7 +115,7 @@ TEST(PlantKinds, TorquesDoWhatChambersWithTheSameMomentsDo) {
 }
 
 TEST(PlantKinds, TorqueIsBoundedOnBothSidesAndNaNIsZero) {
-  PlantSettings settings = by_torque(PlantKind::pcc, 1, 1);
+  PlantSettings settings = by_torque(kPcc, 1, 1);
   ArmPlant plant(settings);
   plant.command(std::vector<double>{-20.0, std::nan("")});
   EXPECT_EQ(plant.commanded_bar(), Eigen::Vector2d(-10.0, 0.0));
@@ -126,7 +124,7 @@ TEST(PlantKinds, TorqueIsBoundedOnBothSidesAndNaNIsZero) {
 /// A uniform moment on one segment: many parts come ever nearer one another.
 TEST(PlantKinds, PiecesConvergeQuadratically) {
   const auto tip = [](int pieces) {
-    PlantSettings settings = by_torque(PlantKind::refined, 1, pieces);
+    PlantSettings settings = by_torque(kRefined, 1, pieces);
     settings.initial_u_rad = Eigen::Vector2d(0.8, 0.0);
     settings.relative_tolerance = 1e-8;
     settings.absolute_tolerance = 1e-10;
@@ -140,10 +138,12 @@ TEST(PlantKinds, PiecesConvergeQuadratically) {
 }
 
 TEST(PlantKinds, WeightsKeepLengthMassAndTheBendUnderAUniformMoment) {
-  PlantSettings settings = by_torque(PlantKind::refined, 1, 3);
-  settings.refined.length_weights = {1.0, 2.0, 1.0};
-  settings.refined.mass_weights = {3.0, 2.0, 1.0};
-  settings.refined.rigidity_weights = {4.0, 2.0, 1.0};
+  PlantSettings settings = by_torque(kRefined, 1, 3);
+  RefinedSettings kind = {.pieces = 3,
+                          .length_weights = {1.0, 2.0, 1.0},
+                          .mass_weights = {3.0, 2.0, 1.0},
+                          .rigidity_weights = {4.0, 2.0, 1.0}};
+  settings.kind = kind;
   settings.arm.gravity_mps2.setZero();
   settings.initial_u_rad = Eigen::Vector2d(0.5, 0.0);
   ArmPlant plant(settings);
@@ -157,20 +157,20 @@ TEST(PlantKinds, WeightsKeepLengthMassAndTheBendUnderAUniformMoment) {
   EXPECT_LT((plant.coordinates() - x).norm(), 1e-9);
   EXPECT_NEAR(plant.u_rad()[0], 0.5, 1e-9);
 
-  settings.refined.mass_weights = {1.0, 2.0};
-  EXPECT_THROW(ArmPlant{settings}, std::invalid_argument);
-  settings.refined.mass_weights = {1.0, 2.0, -1.0};
-  EXPECT_THROW(ArmPlant{settings}, std::invalid_argument);
-  settings.refined = {
-      .pieces = 1000, .length_weights = {}, .mass_weights = {}, .rigidity_weights = {}};
+  for (const auto& weights : {std::vector{1.0, 2.0}, {1.0, 2.0, -1.0}}) {
+    kind.mass_weights = weights;
+    settings.kind = kind;
+    EXPECT_THROW(ArmPlant{settings}, std::invalid_argument);
+  }
+  settings.kind = kRefined(1000);
   EXPECT_THROW(ArmPlant{settings}, std::invalid_argument);
 }
 
 TEST(PlantKinds, JointValuesOfTheirOwnReplaceThoseOfTheSegment) {
-  PlantSettings settings = by_torque(PlantKind::links, 1, 6);
+  PlantSettings settings = by_torque(kLinks, 1, 6);
   settings.arm.gravity_mps2.setZero();
-  settings.links.joint_stiffness_nm_per_rad = 12.0;
-  settings.links.joint_damping_nms_per_rad = 3.0;
+  settings.kind = LinkSettings{
+      .links_per_segment = 6, .joint_stiffness_nm_per_rad = 12.0, .joint_damping_nms_per_rad = 3.0};
   ArmPlant plant(settings);
   plant.advance(10.0, std::vector<double>{0.6, -0.3});
   for (int j = 0; j < 6; ++j) {

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <vector>
 
+#include "softarm/base/time.hpp"
 #include "unit/simulation/paper_arm.hpp"
 
 namespace softarm {
@@ -108,7 +109,7 @@ TEST(SimulatedArm, FramesShowTheArmAtTheInstantOfCapture) {
   ArmPlant truth(settings);
   std::vector<Eigen::Isometry3d> ends(3);
   for (const MocapFrame& seen : frames) {
-    truth.advance(static_cast<double>(seen.capture_ns - kStart) * 1e-9);
+    truth.advance(to_seconds(seen.capture_ns - kStart));
     truth.segment_ends(ends);
     for (std::size_t i = 0; i < 3; ++i) {
       EXPECT_LT((seen.body[i + 1].position_m - ends[i].translation()).norm(), 1e-6);

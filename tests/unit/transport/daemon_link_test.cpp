@@ -1,5 +1,6 @@
 // The daemon's side of LCM over real UDP multicast: ten thousand ticks without a call for memory on
-// the tick's thread, and what it takes for an order.
+// the tick's thread, and what it takes for an order. The link's clock is the test's: it advances
+// when the test says so, and no machine is too slow.
 #include "softarm/transport/daemon_link.hpp"
 
 #include <gtest/gtest.h>
@@ -10,6 +11,7 @@
 
 #include "counted_malloc.hpp"
 #include "softarm/base/clock.hpp"
+#include "softarm/base/time.hpp"
 #include "softarm/runtime/settings.hpp"
 #include "softarm/transport/message_decoding.hpp"
 #include "softarm/transport/settings.hpp"
@@ -49,7 +51,7 @@ class DaemonLinkOverUdp : public ::testing::Test {
   mocap_frame_t straight_frame(std::int64_t number) const {
     mocap_frame_t message{};
     message.frame_number = number;
-    message.capture_time_us = monotonic_now_ns() / 1000;
+    message.capture_time_us = now_ns / 1000;
     message.num_bodies = 4;
     message.bodies.resize(4);
     for (int i = 0; i < 4; ++i) {
@@ -63,17 +65,33 @@ class DaemonLinkOverUdp : public ::testing::Test {
     return message;
   }
 
-  /// Collects until `reached` says so of an input, for at most a second.
+  /// Collects until `reached` says so of an input; time stands still meanwhile.
   template <class Condition>
   bool collect_until(Condition reached) {
-    const std::int64_t end_ns = monotonic_now_ns() + 1'000'000'000;
+    const std::int64_t end_ns = monotonic_now_ns() + kPatience_ns;
     while (monotonic_now_ns() < end_ns) {
-      if (reached(link->collect(monotonic_now_ns()))) return true;
+      if (reached(link->collect(now_ns))) return true;
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }
     return false;
   }
+  /// Collects until everything sent so far has been handled: messages come in the order in which
+  /// they were sent, and this sends one more. False where `excluded` says so of an input.
+  template <class Condition>
+  bool nothing_comes(Condition excluded) {
+    const std::int64_t malformed = link->malformed();
+    sender->publish(transport.lcm.operator_channel, test::example<timing_t>(0, 0));
+    bool came = false;
+    EXPECT_TRUE(collect_until([&](const TickInput& input) {
+      came |= excluded(input);
+      return link->malformed() > malformed;
+    }));
+    return !came;
+  }
 
+  static constexpr std::int64_t kPatience_ns = 60'000'000'000;
+  /// Of the link, an hour behind the machine's: everything arrives at this instant.
+  std::int64_t now_ns = monotonic_now_ns() - 3'600'000'000'000;
   PipelineSettings settings;
   TransportSettings transport;
   std::unique_ptr<LcmNode> sender;
@@ -81,6 +99,9 @@ class DaemonLinkOverUdp : public ::testing::Test {
 };
 
 TEST_F(DaemonLinkOverUdp, TenThousandTicksAllocateNothing) {
+  constexpr int kOnTheirWay = 32;  // frames that a slow machine has not delivered yet
+  settings.safety.hold_after_s = settings.safety.max_latency_s = 1.0;
+  settings.safety.vent_after_s = 2.0;
   ControlPipeline pipeline(settings);
   LoopTiming timing;
   const LcmSettings& lcm = transport.lcm;
@@ -88,7 +109,7 @@ TEST_F(DaemonLinkOverUdp, TenThousandTicksAllocateNothing) {
   curvature_reference_t reference = test::example<curvature_reference_t>(3, 4);
   operator_command_t operator_command{.sequence = 0, .request = operator_command_t::ARM};
   const timing_t not_a_frame = test::example<timing_t>(0, 0);
-  std::int64_t frames = 0, references = 0, active = 0;
+  std::int64_t frames = 0, references = 0, active = 0, lost = 0;
   long allocated = 0, released = 0;
   constexpr int kTicks = 10'000;
   int counted = 0;
@@ -105,9 +126,16 @@ TEST_F(DaemonLinkOverUdp, TenThousandTicksAllocateNothing) {
     }
     const long allocated_before = test::thread_allocations;
     const long released_before = test::thread_releases;
-    const TickInput input = link->collect(monotonic_now_ns());
+    now_ns += pipeline.period_ns();
+    TickInput input = link->collect(now_ns);
+    const std::int64_t wait_until_ns = monotonic_now_ns() + 1'000'000'000;
+    while (k - frames - lost > kOnTheirWay && input.frames.empty()) {
+      std::this_thread::yield();
+      if (monotonic_now_ns() > wait_until_ns) ++lost;
+      input = link->collect(now_ns);
+    }
     const TickOutput& output = pipeline.tick(input);
-    link->publish_command(monotonic_now_ns(), output);
+    link->publish_command(now_ns, output);
     ++timing.ticks;
     link->publish_status(input.now_ns, pipeline, timing);
     link->publish_record(input, output);
@@ -124,10 +152,9 @@ TEST_F(DaemonLinkOverUdp, TenThousandTicksAllocateNothing) {
   }
   EXPECT_EQ(allocated, 0);
   EXPECT_EQ(released, 0);
-  // What a loaded machine drops is lost; enough remains to have tried everything.
-  EXPECT_GT(frames, 500);
+  EXPECT_GT(frames, kTicks / 2);
   EXPECT_GT(references, 10);
-  EXPECT_GT(active, 0);
+  EXPECT_GT(active, kTicks / 2);
   EXPECT_GT(link->malformed(), 0);
   EXPECT_EQ(link->unsent(), 0);
 }
@@ -142,11 +169,10 @@ TEST_F(DaemonLinkOverUdp, WhatWasDecidedBeforeTheValvesVentedIsNotSentAfterIt) {
   });
   TickOutput output;
   output.pressure_bar = PressureVector::Constant(12, 0.5);
-  std::int64_t now_ns = monotonic_now_ns();
-  const auto validity_ns = std::llround(1e9 * settings.safety.command_validity_s);
+  const auto validity_ns = to_ns(settings.safety.command_validity_s);
   const auto arrives = [&](int wanted) {
-    for (int k = 0; count < wanted && k < 100; ++k)
-      sender->wait_until(monotonic_now_ns() + 10'000'000);
+    const std::int64_t end_ns = monotonic_now_ns() + kPatience_ns;
+    while (count < wanted && monotonic_now_ns() < end_ns) sender->wait_until(end_ns);
     return count == wanted;
   };
 
@@ -166,19 +192,25 @@ TEST_F(DaemonLinkOverUdp, WhatWasDecidedBeforeTheValvesVentedIsNotSentAfterIt) {
 
 TEST_F(DaemonLinkOverUdp, AFloodIsBoundedWork) {
   for (int k = 0; k < 2000; ++k) sender->publish(transport.lcm.mocap_channel, straight_frame(k));
-  std::this_thread::sleep_for(std::chrono::milliseconds(50));
-  EXPECT_LE(link->collect(monotonic_now_ns()).frames.size(), 64u);
+  std::size_t most = 0, all = 0;
+  EXPECT_TRUE(collect_until([&](const TickInput& input) {
+    most = std::max(most, input.frames.size());
+    return (all += input.frames.size()) >= 64;
+  }));
+  EXPECT_LE(most, 64u);
 }
 
-TEST_F(DaemonLinkOverUdp, CapturesLieBetweenTheLastCollectionAndNow) {
-  link->collect(monotonic_now_ns());
+// By the machine's own clock.
+TEST_F(DaemonLinkOverUdp, CapturesLieBetweenTheSendingAndNow) {
+  const std::int64_t first_ns = now_ns = monotonic_now_ns();
   std::int64_t number = 0;
   ASSERT_TRUE(collect_until([&](const TickInput& input) {
-    sender->publish(transport.lcm.mocap_channel, straight_frame(++number));
     for (const MocapFrame& frame : input.frames) {
       EXPECT_LE(frame.capture_ns, input.now_ns);
-      EXPECT_GT(frame.capture_ns, input.now_ns - 1'000'000'000);
+      EXPECT_GE(frame.capture_ns, first_ns - 2000) << "stamps are of microseconds";
     }
+    now_ns = monotonic_now_ns();
+    sender->publish(transport.lcm.mocap_channel, straight_frame(++number));
     return number > 20 && !input.frames.empty();
   }));
 }
@@ -189,18 +221,19 @@ TEST_F(DaemonLinkOverUdp, ADisarmIsObeyedWhateverItsNumber) {
                     operator_command_t{.sequence = sequence, .request = what});
   };
   request(1000, operator_command_t::ARM);
-  ASSERT_TRUE(collect_until([](const TickInput& input) { return input.arm; }));
+  ASSERT_TRUE(collect_until([](const TickInput& input) { return input.requests.arm; }));
   // Another person's machine, on which less time has passed.
   request(10, operator_command_t::ARM);
   request(11, operator_command_t::DISARM);
   ASSERT_TRUE(collect_until([](const TickInput& input) {
-    EXPECT_FALSE(input.arm) << "an older ARM is ignored";
-    return input.disarm;
+    EXPECT_FALSE(input.requests.arm) << "an older ARM is ignored";
+    return input.requests.disarm;
   }));
   request(1000, operator_command_t::ARM);
   request(2000, operator_command_t::ARM);
   int armed = 0;
-  ASSERT_TRUE(collect_until([&](const TickInput& input) { return (armed += input.arm) > 0; }));
+  ASSERT_TRUE(
+      collect_until([&](const TickInput& input) { return (armed += input.requests.arm) > 0; }));
 }
 
 TEST_F(DaemonLinkOverUdp, AnEmergencyStopIsObeyedWhateverItsNumberAndIsNoDisarm) {
@@ -209,14 +242,14 @@ TEST_F(DaemonLinkOverUdp, AnEmergencyStopIsObeyedWhateverItsNumberAndIsNoDisarm)
                     operator_command_t{.sequence = sequence, .request = what});
   };
   request(1000, operator_command_t::ARM);
-  ASSERT_TRUE(collect_until([](const TickInput& input) { return input.arm; }));
+  ASSERT_TRUE(collect_until([](const TickInput& input) { return input.requests.arm; }));
   request(10, operator_command_t::EMERGENCY_STOP);
   ASSERT_TRUE(collect_until([](const TickInput& input) {
-    EXPECT_FALSE(input.disarm) << "a disarm would acknowledge the stop";
-    return input.emergency_stop;
+    EXPECT_FALSE(input.requests.disarm) << "a disarm would acknowledge the stop";
+    return input.requests.emergency_stop;
   }));
   request(11, 77);  // nobody knows what that is
-  ASSERT_TRUE(collect_until([](const TickInput& input) { return input.disarm; }));
+  ASSERT_TRUE(collect_until([](const TickInput& input) { return input.requests.disarm; }));
 }
 
 TEST_F(DaemonLinkOverUdp, AGoIsHeardOnceANumberAndTakenBackAtOnce) {
@@ -224,15 +257,14 @@ TEST_F(DaemonLinkOverUdp, AGoIsHeardOnceANumberAndTakenBackAtOnce) {
     sender->publish(transport.lcm.deadman_channel,
                     deadman_t{.sequence = sequence, .go = static_cast<std::int8_t>(go)});
   };
-  const auto heard = [](const TickInput& input) {
-    return input.newest_go_ns != SafetyInput::kNever;
-  };
+  const auto heard = [](const TickInput& input) { return input.newest_go_ns != kNever; };
   say(1, true);
   ASSERT_TRUE(collect_until(heard));
-  const std::int64_t first_ns = link->collect(monotonic_now_ns()).newest_go_ns;
+  const std::int64_t first_ns = link->collect(now_ns).newest_go_ns;
+  now_ns += 1'000'000;
   say(1, true);  // a buffer that is sent again and again
-  EXPECT_FALSE(
-      collect_until([&](const TickInput& input) { return input.newest_go_ns != first_ns; }));
+  EXPECT_TRUE(
+      nothing_comes([&](const TickInput& input) { return input.newest_go_ns != first_ns; }));
   say(2, true);
   ASSERT_TRUE(collect_until([&](const TickInput& input) { return input.newest_go_ns > first_ns; }));
   say(3, false);
@@ -253,7 +285,8 @@ TEST_F(DaemonLinkOverUdp, MeasuredPressuresArriveOnceAndOnlyIfTheyMakeSense) {
     EXPECT_EQ((*input.measured_bar)[11], 0.125 + 0.25 * 11);
     return true;
   }));
-  const std::int64_t heard_ns = link->collect(monotonic_now_ns()).newest_measurement_ns;
+  const std::int64_t heard_ns = link->collect(now_ns).newest_measurement_ns;
+  now_ns += 1'000'000;
   send(8, 1.0F);
   send(12, std::numeric_limits<float>::quiet_NaN());
   EXPECT_TRUE(collect_until([&](const TickInput& input) {
@@ -273,7 +306,8 @@ TEST_F(DaemonLinkOverUdp, AReferenceThatBeginsAnewIsHeardAfterASilence) {
   send(5000);
   ASSERT_TRUE(collect_until(came));
   send(1);
-  EXPECT_FALSE(collect_until(came)) << "older";  // this takes a second of silence
+  EXPECT_TRUE(nothing_comes(came)) << "older";
+  now_ns += 600'000'000;  // of silence
   send(2);
   EXPECT_TRUE(collect_until(came));
   send(1);

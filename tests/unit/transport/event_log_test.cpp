@@ -1,5 +1,5 @@
-// Our reader of LCM's logs against LCM's own writer, and what damage of every kind costs: the event
-// it hits, and no other.
+// Our reader and writer of LCM's logs against LCM's own writer, and what damage of every kind
+// costs: the event it hits, and no other.
 #include "softarm/transport/event_log.hpp"
 
 #include <gtest/gtest.h>
@@ -170,6 +170,46 @@ TEST(EventLog, NoiseAndHostileSizesAreOnlyDamage) {
   EXPECT_GT(reading.damaged_bytes, 250'000);
   EXPECT_EQ(read("").events.size(), 0u);
   EXPECT_EQ(read(sync).damaged_bytes, 4);
+}
+
+class WrittenLog : public ::testing::Test {
+ protected:
+  ~WrittenLog() override { std::filesystem::remove(path_); }
+  const std::filesystem::path path_ =
+      std::filesystem::temp_directory_path() / ("softarm_written_log_" + std::to_string(getpid()));
+};
+
+TEST_F(WrittenLog, IsByteForByteWhatLcmWrites) {
+  const std::string expected = lcm_log(500, 300);
+  {
+    std::istringstream stream(expected);
+    EventLogReader reader(stream);
+    EventLogWriter log(path_);
+    for (LogEvent event; reader.next(event);) log.write(event.time_us, event.channel, event.data);
+    log.close();
+  }
+  std::ostringstream written;
+  written << std::ifstream(path_, std::ios::binary).rdbuf();
+  EXPECT_TRUE(written.str() == expected);
+}
+
+TEST_F(WrittenLog, RefusesWhatNoReaderWouldTakeAndReportsAFullDisk) {
+  EventLogWriter log(path_);
+  const std::vector<std::byte> data(10);
+  EXPECT_THROW(log.write(0, "", data), std::invalid_argument);
+  EXPECT_THROW(log.write(0, std::string(64, 'x'), data), std::invalid_argument);
+  const std::vector<std::byte> much(EventLogReader::kLargestData + 1);
+  EXPECT_THROW(log.write(0, "X", much), std::invalid_argument);
+  log.write(0, std::string(63, 'x'), data);
+  log.close();
+  EXPECT_THROW(EventLogWriter("/nowhere/log"), std::runtime_error);
+  EventLogWriter full("/dev/full");
+  EXPECT_THROW(
+      {
+        full.write(0, "X", data);
+        full.close();
+      },
+      std::runtime_error);
 }
 
 }  // namespace

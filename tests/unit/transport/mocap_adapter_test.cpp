@@ -9,6 +9,7 @@
 
 #include "softarm/transport/message_decoding.hpp"
 #include "softarm/transport/settings.hpp"
+#include "softarm/transport/softarm_mocap.hpp"
 #include "unit/transport/messages.hpp"
 
 namespace softarm {
@@ -57,6 +58,21 @@ ArmParameters three_segments() {
   return arm;
 }
 
+void to_frame(const MocapAdapter& adapter, const mocap_frame_t& message, MocapFrame& frame) {
+  const auto sent = std::make_unique<SentFrame>();
+  to_sent(message, *sent);
+  adapter.to_frame(*sent, frame);
+}
+
+mocap_frame_t message_of(const MocapAdapter& adapter, const MocapFrame& frame,
+                         std::int64_t sender_time_us) {
+  const auto sent = std::make_unique<SentFrame>();
+  adapter.to_sent(frame, sender_time_us, *sent);
+  mocap_frame_t message;
+  to_message(*sent, message);
+  return message;
+}
+
 const BodySettings kBodies{.base_id = 10, .segment_ids = {30, 20, -5}};
 
 TEST(MocapAdapter, FindsBodiesInAnyOrderAmongOthers) {
@@ -67,7 +83,7 @@ TEST(MocapAdapter, FindsBodiesInAnyOrderAmongOthers) {
   for (int k = 0; k < 100; ++k) {
     std::shuffle(bodies.begin(), bodies.end(), random);
     MocapFrame frame;
-    adapter.to_frame(frame_of(bodies), frame);
+    to_frame(adapter, frame_of(bodies), frame);
     EXPECT_EQ(frame.frame_number, 12);
     EXPECT_EQ(frame.segments, 3);
     expect_pose(frame.body[0], 0.1);
@@ -80,14 +96,14 @@ TEST(MocapAdapter, FindsBodiesInAnyOrderAmongOthers) {
 TEST(MocapAdapter, AnAbsentOrInvalidBodyIsNotSeen) {
   const MocapAdapter adapter(kBodies, three_segments());
   MocapFrame frame;
-  adapter.to_frame(frame_of({body(10, 0.1), body(30, 0.2), body(20, 0.3), body(-5, 0.4)}), frame);
+  to_frame(adapter, frame_of({body(10, 0.1), body(30, 0.2), body(20, 0.3), body(-5, 0.4)}), frame);
   // Into the same frame: nothing of the one before may shine through.
-  adapter.to_frame(frame_of({body(30, 0.2), body(20, 0.3, false)}), frame);
+  to_frame(adapter, frame_of({body(30, 0.2), body(20, 0.3, false)}), frame);
   EXPECT_FALSE(frame.body[0].valid);
   expect_pose(frame.body[1], 0.2);
   EXPECT_FALSE(frame.body[2].valid);
   EXPECT_FALSE(frame.body[3].valid);
-  adapter.to_frame(frame_of({}), frame);
+  to_frame(adapter, frame_of({}), frame);
   for (std::size_t i = 0; i < 4; ++i) EXPECT_FALSE(frame.body[i].valid);
 }
 
@@ -97,13 +113,12 @@ TEST(MocapAdapter, AFixedBaseIsAlwaysSeen) {
   const MocapAdapter adapter(fixed, three_segments());
   MocapFrame frame;
   // A body that happens to carry the id -1 is not the base.
-  adapter.to_frame(frame_of({body(-1, 0.7), body(30, 0.2)}), frame);
+  to_frame(adapter, frame_of({body(-1, 0.7), body(30, 0.2)}), frame);
   EXPECT_TRUE(frame.body[0].valid);
   EXPECT_EQ(frame.body[0].position_m, Eigen::Vector3d(7, 8, 9));
   EXPECT_LT((frame.body[0].orientation.toRotationMatrix() - three_segments().base_rotation).norm(),
             1e-12);
-  mocap_frame_t message;
-  adapter.to_message(frame, 0, message);
+  const mocap_frame_t message = message_of(adapter, frame, 0);
   EXPECT_EQ(message.num_bodies, 3) << "a fixed base is nothing a camera sees";
 }
 
@@ -113,7 +128,7 @@ TEST(MocapAdapter, NaNPassesUnchangedToWhoeverJudgesIt) {
   message.bodies[0].position_m[1] = std::nan("");
   message.bodies[1].orientation[2] = std::numeric_limits<double>::infinity();
   MocapFrame frame;
-  adapter.to_frame(message, frame);
+  to_frame(adapter, message, frame);
   EXPECT_TRUE(frame.body[0].valid);
   EXPECT_TRUE(std::isnan(frame.body[0].position_m.y()));
   EXPECT_TRUE(std::isinf(frame.body[1].orientation.y()));
@@ -122,7 +137,7 @@ TEST(MocapAdapter, NaNPassesUnchangedToWhoeverJudgesIt) {
 TEST(MocapAdapter, TheFirstOfTwoBodiesWithOneIdCounts) {
   const MocapAdapter adapter(kBodies, three_segments());
   MocapFrame frame;
-  adapter.to_frame(frame_of({body(30, 0.2), body(30, 0.9)}), frame);
+  to_frame(adapter, frame_of({body(30, 0.2), body(30, 0.9)}), frame);
   expect_pose(frame.body[1], 0.2);
 }
 
@@ -142,13 +157,12 @@ TEST(MocapAdapter, AFrameSurvivesTheWire) {
               .normalized();
       sent.body[i].valid = random() % 4 != 0;
     }
-    mocap_frame_t message;
-    adapter.to_message(sent, 555, message);
+    const mocap_frame_t message = message_of(adapter, sent, 555);
     EXPECT_EQ(message.capture_time_us, 555);
     mocap_frame_t received;
     ASSERT_TRUE(decode(test::encoded(message), received));
     MocapFrame frame;
-    adapter.to_frame(received, frame);
+    to_frame(adapter, received, frame);
     EXPECT_EQ(frame.frame_number, sent.frame_number);
     EXPECT_EQ(frame.segments, 3);
     for (std::size_t i = 0; i < 4; ++i) {

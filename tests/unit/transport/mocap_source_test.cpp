@@ -5,6 +5,8 @@
 
 #include <cmath>
 #include <random>
+#include <softarm_messages/optitrack_frame_t.hpp>
+#include <softarm_messages/rigid_transform_t.hpp>
 
 #include "counted_malloc.hpp"
 #include "softarm/transport/settings.hpp"
@@ -28,9 +30,9 @@ Eigen::Isometry3d random_pose(std::mt19937& random) {
 }
 
 /// Y up, millimetres, x y z w, and a plate on every body.
-TransportSettings foreign(MocapSourceKind kind, std::mt19937& random) {
+TransportSettings foreign(const char* source, std::mt19937& random) {
   TransportSettings transport;
-  transport.mocap = {.source = kind,
+  transport.mocap = {.source = *mocap_sources().find(source),
                      .unit = LengthUnit::millimetre,
                      .quaternion = QuaternionOrder::xyzw,
                      .axes = Eigen::Matrix3d::Identity()};
@@ -38,7 +40,7 @@ TransportSettings foreign(MocapSourceKind kind, std::mt19937& random) {
   transport.lcm.mocap_channel = "ROOM";
   transport.bodies = {.base_id = 10, .segment_ids = {30, 20}};
   const auto plate = [&](const std::string& name) {
-    PlateSettings out;
+    MarkerFrameSettings out;
     out.name = name;
     const Eigen::AngleAxisd turn(random_pose(random).linear());
     out.rotation_rad = turn.angle() * turn.axis();
@@ -58,7 +60,7 @@ ArmParameters two_segments() {
 }
 
 /// What a camera of that world would say of S_i at `pose`, by matrices: sent = A^-1 S_i plate^-1.
-Eigen::Isometry3d sent(const Eigen::Isometry3d& pose, const PlateSettings& plate,
+Eigen::Isometry3d sent(const Eigen::Isometry3d& pose, const MarkerFrameSettings& plate,
                        const Eigen::Matrix3d& axes) {
   Eigen::Isometry3d on_body = Eigen::Isometry3d::Identity();
   on_body.linear() =
@@ -84,14 +86,15 @@ void expect_pose(const BodyPose& pose, const Eigen::Isometry3d& truth, double to
 
 TEST(MocapSource, OptitrackFramesBecomePosesOfTheSegmentsEnds) {
   std::mt19937 random(2);
-  const TransportSettings transport = foreign(MocapSourceKind::optitrack, random);
+  const TransportSettings transport = foreign("optitrack", random);
   MocapSource source(transport, {}, two_segments());
   ASSERT_EQ(source.channels(), std::vector<std::string>{"ROOM"});
   for (int trial = 0; trial < 20; ++trial) {
     const Eigen::Isometry3d truth[] = {random_pose(random), random_pose(random),
                                        random_pose(random)};
-    const PlateSettings plates[] = {transport.bodies.base_plate, transport.bodies.segment_plates[0],
-                                    transport.bodies.segment_plates[1]};
+    const MarkerFrameSettings plates[] = {transport.bodies.base_plate,
+                                          transport.bodies.segment_plates[0],
+                                          transport.bodies.segment_plates[1]};
     const int ids[] = {10, 30, 20};
     optitrack_frame_t message{};
     message.utime = 5;
@@ -125,13 +128,14 @@ TEST(MocapSource, OptitrackFramesBecomePosesOfTheSegmentsEnds) {
 
 TEST(MocapSource, BodiesOnChannelsOfTheirOwnBecomeOneFrame) {
   std::mt19937 random(3);
-  const TransportSettings transport = foreign(MocapSourceKind::rigid_transform, random);
+  const TransportSettings transport = foreign("rigid_transform", random);
   MocapSource source(transport, {}, two_segments());
   ASSERT_EQ(source.channels(), (std::vector<std::string>{"ROOM_base", "ROOM_middle", "ROOM_tip"}));
   EXPECT_EQ(source.find("ROOM_tip"), 2U);
   EXPECT_EQ(source.find("ROOM"), std::nullopt);
-  const PlateSettings plates[] = {transport.bodies.base_plate, transport.bodies.segment_plates[0],
-                                  transport.bodies.segment_plates[1]};
+  const MarkerFrameSettings plates[] = {transport.bodies.base_plate,
+                                        transport.bodies.segment_plates[0],
+                                        transport.bodies.segment_plates[1]};
   MocapFrame frame;
   for (int trial = 0; trial < 20; ++trial) {
     const std::int64_t arrival_ns = 1'000'000'000 + 5'000'000 * trial;
@@ -163,7 +167,7 @@ TEST(MocapSource, BodiesOnChannelsOfTheirOwnBecomeOneFrame) {
 
 TEST(MocapSource, AFixedBaseNeedsNoChannel) {
   std::mt19937 random(4);
-  TransportSettings transport = foreign(MocapSourceKind::rigid_transform, random);
+  TransportSettings transport = foreign("rigid_transform", random);
   transport.bodies.base_id = -1;
   MocapSource source(transport, {}, two_segments());
   ASSERT_EQ(source.channels(), (std::vector<std::string>{"ROOM_middle", "ROOM_tip"}));
@@ -178,7 +182,7 @@ TEST(MocapSource, AFixedBaseNeedsNoChannel) {
 
 TEST(MocapSource, WhatTheAdapterSendsItReadsBack) {
   std::mt19937 random(5);
-  const TransportSettings transport = foreign(MocapSourceKind::optitrack, random);
+  const TransportSettings transport = foreign("optitrack", random);
   const MocapAdapter adapter(transport.bodies, two_segments(), transport.mocap);
   MocapSource source(transport, {}, two_segments());
   MocapFrame frame, again;
@@ -187,23 +191,25 @@ TEST(MocapSource, WhatTheAdapterSendsItReadsBack) {
     truth[i] = random_pose(random);
     frame.body[i] = {truth[i].translation(), Eigen::Quaterniond(truth[i].linear()), i != 1};
   }
+  const auto sent = std::make_unique<SentFrame>();
+  adapter.to_sent(frame, 123'456, *sent);
+  const auto format = transport.mocap.source.make();
+  const auto bytes = format->encode(*sent);
   optitrack_frame_t message;
-  adapter.to_message(frame, 123'456, message);
+  ASSERT_GT(message.decode(bytes.data(), 0, static_cast<int>(bytes.size())), 0);
   EXPECT_EQ(message.timestamp, 0.123456);
-  ASSERT_EQ(source.take(0, encoded(message), 0, again), MocapReceipt::frame);
+  ASSERT_EQ(source.take(0, bytes, 0, again), MocapReceipt::frame);
   EXPECT_EQ(source.sender_time_us(), 123'456);
   expect_pose(again.body[0], truth[0], 3e-6);
   EXPECT_FALSE(again.body[1].valid);
   expect_pose(again.body[2], truth[2], 3e-6);
-  rigid_transform_t single;
-  adapter.to_message(frame.body[2], 2, 5, single);
-  expect_pose(adapter.to_pose(single, 2), truth[2], 1e-12);
+  expect_pose(adapter.to_pose(adapter.to_sent(frame.body[2], 2), 2), truth[2], 1e-12);
 }
 
 TEST(MocapSource, HostileNumbersStayWithinBounds) {
   std::mt19937 random(6);
-  MocapSource optitrack(foreign(MocapSourceKind::optitrack, random), {}, two_segments());
-  MocapSource vicon(foreign(MocapSourceKind::rigid_transform, random), {}, two_segments());
+  MocapSource optitrack(foreign("optitrack", random), {}, two_segments());
+  MocapSource vicon(foreign("rigid_transform", random), {}, two_segments());
   MocapFrame frame;
   const double kNan = std::nan("");
   for (const double time_s : {1e300, -1e300, HUGE_VAL, -HUGE_VAL, kNan, 0.0}) {
@@ -218,6 +224,16 @@ TEST(MocapSource, HostileNumbersStayWithinBounds) {
     EXPECT_LE(frame.capture_ns, 1'000'000'000);
     EXPECT_TRUE(frame.body[1].valid && std::isnan(frame.body[1].position_m.x()))
         << "the validator judges it";
+  }
+  TransportSettings transport;
+  transport.bodies = {.base_id = -1, .segment_ids = {1, 2}};
+  MocapSource own(transport, {}, two_segments());
+  for (const std::int64_t time_us : {INT64_MAX, INT64_MIN, INT64_MIN + 1}) {
+    mocap_frame_t message{};
+    message.capture_time_us = time_us;
+    ASSERT_EQ(own.take(0, encoded(message), 1'000'000'000, frame), MocapReceipt::frame);
+    EXPECT_EQ(frame.capture_ns, 1'000'000'000);
+    EXPECT_LT(std::abs(own.sender_time_us() / 2), INT64_MAX / 1000 / 2) << "in ns it overflows";
   }
   rigid_transform_t message{};
   for (const std::int64_t utime : {INT64_MAX, INT64_MIN, INT64_MIN + 1}) {
@@ -234,8 +250,8 @@ TEST(MocapSource, HostileNumbersStayWithinBounds) {
 
 TEST(MocapSource, TakingPacketsAllocatesNothing) {
   std::mt19937 random(7);
-  MocapSource optitrack(foreign(MocapSourceKind::optitrack, random), {}, two_segments());
-  MocapSource vicon(foreign(MocapSourceKind::rigid_transform, random), {}, two_segments());
+  MocapSource optitrack(foreign("optitrack", random), {}, two_segments());
+  MocapSource vicon(foreign("rigid_transform", random), {}, two_segments());
   optitrack_frame_t message{};
   message.num_rigid_bodies = 5;
   message.rigid_bodies.resize(5, optitrack_rigid_body_t{});

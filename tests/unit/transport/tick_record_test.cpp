@@ -49,10 +49,12 @@ bool same_bits(const A& a, const B& b, std::size_t count) {
 
 void expect_same(const TickInput& a, const TickInput& b) {
   // A new field of TickInput stops the build here too: it belongs into this test.
-  const auto& [now_a, frames_a, reference_a, arm_a, disarm_a, stop_a, shutdown_a, expired_a,
-               overruns_a, measurement_a, measured_a, go_a] = a;
-  const auto& [now_b, frames_b, reference_b, arm_b, disarm_b, stop_b, shutdown_b, expired_b,
-               overruns_b, measurement_b, measured_b, go_b] = b;
+  const auto& [now_a, frames_a, reference_a, requests_a, expired_a, overruns_a, measurement_a,
+               measured_a, go_a] = a;
+  const auto& [now_b, frames_b, reference_b, requests_b, expired_b, overruns_b, measurement_b,
+               measured_b, go_b] = b;
+  const auto& [arm_a, disarm_a, stop_a, shutdown_a] = requests_a;
+  const auto& [arm_b, disarm_b, stop_b, shutdown_b] = requests_b;
   EXPECT_EQ(now_a, now_b);
   EXPECT_EQ(arm_a, arm_b);
   EXPECT_EQ(disarm_a, disarm_b);
@@ -121,14 +123,14 @@ TEST(TickRecord, AnyInputComesBackBitForBit) {
       input.now_ns = any.integer();
       input.frames = frames;
       input.reference = k % 2 == 0 ? &reference : nullptr;
-      input.arm = k % 3 == 0;
-      input.disarm = k % 5 == 0;
-      input.shutdown = k % 7 == 0;
+      input.requests.arm = k % 3 == 0;
+      input.requests.disarm = k % 5 == 0;
+      input.requests.shutdown = k % 7 == 0;
       input.command_expired = k % 11 == 0;
       input.consecutive_overruns = static_cast<int>(any.random());
       input.newest_measurement_ns = any.integer();
       input.newest_go_ns = any.integer();
-      input.emergency_stop = k % 11 == 0;
+      input.requests.emergency_stop = k % 11 == 0;
       const PressureVector measured =
           PressureVector::Random(4 * segments).cast<float>().cast<double>();
       if (k % 4 == 0) input.measured_bar = &measured;

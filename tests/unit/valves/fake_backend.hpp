@@ -1,4 +1,4 @@
-// Valve hardware that does what a test says, and keeps what it was asked to do.
+// Valve hardware that does what a test asks for, and keeps what it was asked to do.
 #pragma once
 
 #include <cmath>

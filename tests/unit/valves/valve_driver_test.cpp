@@ -18,11 +18,15 @@ namespace {
 
 using test::FakeHardware;
 
-// The one line of a back end that is added.
-FakeHardware registered_hardware;
-const ValveBackendRegistration kFake("fake", [](const ValveDriverSettings&, double) {
-  return std::make_unique<test::FakeBackend>(registered_hardware);
-});
+/// A back end that is made by its name.
+class NamedBackend : public test::FakeBackend {
+ public:
+  explicit NamedBackend(const ValveDriverSettings&) : FakeBackend(hardware_) {}
+
+ private:
+  FakeHardware hardware_;
+};
+const ValveBackendRegistration<NamedBackend> kRegistration("fake");
 
 constexpr std::int64_t kMs = 1'000'000;
 constexpr std::int64_t kPeriod = 5 * kMs;
@@ -128,7 +132,7 @@ TEST_F(Driver, PressuresThatAreNoNumbersAreNoAnswer) {
   EXPECT_TRUE(vented());
   EXPECT_EQ(driver->guard().state(), ValveState::disconnected);
   EXPECT_EQ(driver->guard().counters().no_answers, 3);
-  EXPECT_EQ(text(), "DISCONNECTED (no answer in time): nowhere: pressures that are no numbers");
+  EXPECT_EQ(text(), "DISCONNECTED (no answer in time): nowhere: pressures that are not numbers");
 }
 
 // The clock is asked again after the decision: hardware that has vented meanwhile gets zero.
@@ -214,7 +218,7 @@ TEST(ValveBackends, AnUnknownNameIsRefusedWithThoseThatThereAre) {
     EXPECT_STREQ(error.what(),
                  "valves.backend: expected one that this program has (fake, modbus), got modbuss");
   }
-  EXPECT_THROW(ValveBackendRegistration("modbus", nullptr), std::invalid_argument);
+  EXPECT_THROW(ValveBackendRegistration<NamedBackend>("modbus"), std::invalid_argument);
 }
 
 }  // namespace

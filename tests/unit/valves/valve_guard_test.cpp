@@ -274,6 +274,36 @@ TEST_F(Guard, ATerminalThatIsNotReadyIsWaitedForAndGivenUp) {
   EXPECT_EQ(guard->reason(), ValveReason::not_ready);
 }
 
+// Of a terminal that now and then does not answer, the starting takes as long as of any other.
+TEST_F(Guard, FailuresDoNotProlongTheWaitForATerminalThatIsNotReady) {
+  for (const LinkResult result : {LinkResult::no_answer, LinkResult::exception_reply}) {
+    make();
+    read_back.ready = false;
+    ASSERT_TRUE(reach(ValveState::starting));
+    const std::int64_t since = now;
+    for (int k = 0; k < 5000 && guard->state() == ValveState::starting; ++k)
+      cycle(k % 50 == 0 ? result : LinkResult::ok);
+    EXPECT_EQ(guard->state(), ValveState::disconnected);
+    EXPECT_EQ(guard->reason(), ValveReason::not_ready);
+    EXPECT_NEAR(static_cast<double>(now - since), 20'000.0 * kMs, 2 * kPeriod);
+  }
+}
+
+// Nor do failures of one kind that begin before the terminal is secured shorten it.
+TEST_F(Guard, FailuresWhileSecuringAreForgottenOnceItIsSecured) {
+  secure_result = LinkResult::no_answer;
+  ASSERT_TRUE(reach(ValveState::securing));
+  for (int k = 0; k < settings.driver.tolerated_failures; ++k) cycle();
+  ASSERT_EQ(guard->state(), ValveState::securing);
+  secure_result = LinkResult::ok;
+  cycle();
+  ASSERT_EQ(guard->state(), ValveState::starting);
+  for (int k = 0; k < settings.driver.tolerated_failures; ++k) {
+    cycle(LinkResult::no_answer);
+    EXPECT_EQ(guard->state(), ValveState::starting) << k;
+  }
+}
+
 TEST_F(Guard, AGapInTimeDegrades) {
   run();
   now += 300 * kMs;

@@ -116,7 +116,7 @@ ControlScene bench_scene(const Experiment& experiment, double duration_s, double
   ControlScene scene;
   scene.name = experiment.name;
   for (const ReferencePhase& phase : experiment.reference.phases)
-    scene.follows_tip |= std::holds_alternative<TipPathReference>(phase.kind);
+    scene.follows_tip |= phase.kind.is_tip_path();
   for (const double rate_hz : kRates_hz) {
     progress(fmt::format("{}: {:g} Hz", scene.name, rate_hz));
     Experiment changed = experiment;

@@ -2,9 +2,9 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <nlohmann/json.hpp>
 
 #include "dev/bench/control_bench.hpp"
-#include "softarm/base/json_writer.hpp"
 
 namespace softarm {
 namespace {
@@ -15,22 +15,18 @@ std::string error_cell(const ControlScene& scene, const TrackingTrial& trial) {
                      trial.stayed_active ? "" : "  left ACTIVE");
 }
 
-void write_row(JsonWriter& json, const ControlRow& row) {
-  json.open_object();
-  json.member("what", row.what);
-  json.member("rate_hz", row.rate_hz);
-  json.member("u_rms_rad", row.trial.u_rms_rad);
-  json.member("tip_rms_m", row.trial.tip_rms_m);
-  json.member("stayed_active", row.trial.stayed_active);
-  json.member("controller_ns", row.controller_ns > 0.0 ? row.controller_ns : std::nan(""));
-  json.close_object();
-}
+using Json = nlohmann::ordered_json;
 
-void write_list(JsonWriter& json, const char* key, const std::vector<double>& values) {
-  json.key(key);
-  json.open_array();
-  for (const double value : values) json.value(value);
-  json.close_array();
+Json json_of(const std::vector<ControlRow>& rows) {
+  Json list = Json::array();
+  for (const ControlRow& row : rows)
+    list.push_back({{"what", row.what},
+                    {"rate_hz", row.rate_hz},
+                    {"u_rms_rad", row.trial.u_rms_rad},
+                    {"tip_rms_m", row.trial.tip_rms_m},
+                    {"stayed_active", row.trial.stayed_active},
+                    {"controller_ns", row.controller_ns > 0.0 ? row.controller_ns : std::nan("")}});
+  return list;
 }
 
 }  // namespace
@@ -53,25 +49,13 @@ std::string table(const std::vector<ControlScene>& scenes) {
 }
 
 std::string json(const std::vector<ControlScene>& scenes) {
-  JsonWriter json;
-  json.open_object();
-  json.key("scenes");
-  json.open_array();
-  for (const ControlScene& scene : scenes) {
-    json.open_object();
-    json.member("name", scene.name);
-    json.member("follows_tip", scene.follows_tip);
-    for (const auto& [key, rows] : {std::pair{"rates", &scene.rates}, {"terms", &scene.terms}}) {
-      json.key(key);
-      json.open_array();
-      for (const ControlRow& row : *rows) write_row(json, row);
-      json.close_array();
-    }
-    json.close_object();
-  }
-  json.close_array();
-  json.close_object();
-  return json.text() + "\n";
+  Json list = Json::array();
+  for (const ControlScene& scene : scenes)
+    list.push_back({{"name", scene.name},
+                    {"follows_tip", scene.follows_tip},
+                    {"rates", json_of(scene.rates)},
+                    {"terms", json_of(scene.terms)}});
+  return Json{{"scenes", std::move(list)}}.dump() + "\n";
 }
 
 std::string table(const std::vector<StabilityMap>& maps) {
@@ -86,38 +70,26 @@ std::string table(const std::vector<StabilityMap>& maps) {
 }
 
 std::string json(const std::vector<StabilityMap>& maps) {
-  JsonWriter json;
-  json.open_object();
-  json.key("maps");
-  json.open_array();
+  Json list = Json::array();
   for (const StabilityMap& map : maps) {
-    json.open_object();
-    json.member("axis", map.axis);
-    write_list(json, "values", map.values);
-    write_list(json, "kp_nm_per_rad", map.kp_nm_per_rad);
-    write_list(json, "simulated_limit_nm_per_rad", map.simulated_limit);
-    write_list(json, "predicted_limit_nm_per_rad", map.predicted_limit);
-    json.key("growth_1ps");
-    json.open_array();
+    Json growth = Json::array(), stable = Json::array();
     for (const auto& column : map.simulated) {
-      json.open_array();
-      for (const KickedTrial& trial : column) json.value(trial.growth_1ps);
-      json.close_array();
+      Json& rates = growth.emplace_back(Json::array());
+      Json& verdicts = stable.emplace_back(Json::array());
+      for (const KickedTrial& trial : column) {
+        rates.push_back(trial.growth_1ps);
+        verdicts.push_back(trial.stable);
+      }
     }
-    json.close_array();
-    json.key("stable");
-    json.open_array();
-    for (const auto& column : map.simulated) {
-      json.open_array();
-      for (const KickedTrial& trial : column) json.value(trial.stable);
-      json.close_array();
-    }
-    json.close_array();
-    json.close_object();
+    list.push_back({{"axis", map.axis},
+                    {"values", map.values},
+                    {"kp_nm_per_rad", map.kp_nm_per_rad},
+                    {"simulated_limit_nm_per_rad", map.simulated_limit},
+                    {"predicted_limit_nm_per_rad", map.predicted_limit},
+                    {"growth_1ps", std::move(growth)},
+                    {"stable", std::move(stable)}});
   }
-  json.close_array();
-  json.close_object();
-  return json.text() + "\n";
+  return Json{{"maps", std::move(list)}}.dump() + "\n";
 }
 
 std::string table(const std::vector<SoftnessRow>& rows) {
@@ -130,22 +102,14 @@ std::string table(const std::vector<SoftnessRow>& rows) {
 }
 
 std::string json(const std::vector<SoftnessRow>& rows) {
-  JsonWriter json;
-  json.open_object();
-  json.key("rows");
-  json.open_array();
-  for (const SoftnessRow& row : rows) {
-    json.open_object();
-    json.member("law", row.law);
-    json.member("kp_nm_per_rad", row.kp_nm_per_rad);
-    json.member("predicted_n_per_m", row.predicted_n_per_m);
-    json.member("simulated_n_per_m", row.simulated_n_per_m);
-    json.member("tracking_rms_rad", row.tracking_rms_rad);
-    json.close_object();
-  }
-  json.close_array();
-  json.close_object();
-  return json.text() + "\n";
+  Json list = Json::array();
+  for (const SoftnessRow& row : rows)
+    list.push_back({{"law", row.law},
+                    {"kp_nm_per_rad", row.kp_nm_per_rad},
+                    {"predicted_n_per_m", row.predicted_n_per_m},
+                    {"simulated_n_per_m", row.simulated_n_per_m},
+                    {"tracking_rms_rad", row.tracking_rms_rad}});
+  return Json{{"rows", std::move(list)}}.dump() + "\n";
 }
 
 }  // namespace softarm

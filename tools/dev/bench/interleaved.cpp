@@ -1,11 +1,10 @@
 #include "dev/bench/interleaved.hpp"
 
-#include <time.h>
-
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <limits>
+
+#include "softarm/base/clock.hpp"
 
 namespace softarm {
 namespace {
@@ -15,25 +14,13 @@ constexpr double kLongCall_ns = 2e6;
 constexpr int kMostCalls = 1 << 20;  ///< a slot, where a call takes no time at all
 constexpr std::size_t kMinimumRounds = 3;
 
-double now_ns() {
-  const auto now = std::chrono::steady_clock::now().time_since_epoch();
-  return static_cast<double>(std::chrono::duration_cast<std::chrono::nanoseconds>(now).count());
-}
-
-/// Of this thread: what others do on the same core does not count.
-double processor_time_ns() {
-  timespec time{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
-  return 1e9 * static_cast<double>(time.tv_sec) + static_cast<double>(time.tv_nsec);
-}
-
-double timed_ns(const std::function<void(int)>& run, int calls) {
-  const double start_ns = processor_time_ns();
-  run(calls);
-  return (processor_time_ns() - start_ns) / calls;
-}
-
 }  // namespace
+
+BenchClocks machine_clocks() {
+  return {.wall_ns = [] { return static_cast<double>(monotonic_now_ns()); },
+          // Of this thread: what others do on the same core does not count.
+          .processor_ns = [] { return static_cast<double>(thread_cpu_ns()); }};
+}
 
 double quantile(std::vector<double> values, double share) {
   std::erase_if(values, [](double x) { return !std::isfinite(x); });
@@ -49,7 +36,13 @@ void InterleavedTiming::add(std::function<void(int calls)> run) {
   entries_.push_back({.run = std::move(run), .calls = 1, .every = 1, .call_ns = {}});
 }
 
-void InterleavedTiming::calibrate(Entry& entry) {
+double InterleavedTiming::timed_ns(const std::function<void(int)>& run, int calls) const {
+  const double start_ns = clocks_.processor_ns();
+  run(calls);
+  return (clocks_.processor_ns() - start_ns) / calls;
+}
+
+void InterleavedTiming::calibrate(Entry& entry) const {
   constexpr int kTrials = 3;  // the fastest counts: the first is cold, any may be interrupted
   double call_ns = 0.0;
   for (entry.calls = 1;; entry.calls *= 2) {
@@ -68,8 +61,9 @@ void InterleavedTiming::measure(double seconds, const std::function<void(double)
     entry.call_ns.clear();
     calibrate(entry);
   }
-  const double start_ns = now_ns(), length_ns = 1e9 * seconds;
-  for (std::size_t round = 0; round < kMinimumRounds || now_ns() - start_ns < length_ns; ++round) {
+  const double start_ns = clocks_.wall_ns(), length_ns = 1e9 * seconds;
+  for (std::size_t round = 0; round < kMinimumRounds || clocks_.wall_ns() - start_ns < length_ns;
+       ++round) {
     for (Entry& entry : entries_) {
       const bool takes_part = round % static_cast<std::size_t>(entry.every) == 0;
       // The first calls fetch code and data that the others have driven out.
@@ -77,7 +71,7 @@ void InterleavedTiming::measure(double seconds, const std::function<void(double)
       entry.call_ns.push_back(takes_part ? timed_ns(entry.run, entry.calls)
                                          : std::numeric_limits<double>::quiet_NaN());
     }
-    progress(std::min(1.0, (now_ns() - start_ns) / length_ns));
+    progress(std::min(1.0, (clocks_.wall_ns() - start_ns) / length_ns));
   }
 }
 

@@ -4,6 +4,7 @@
 
 #include <functional>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace softarm {
@@ -14,8 +15,16 @@ struct CallTime {
   std::size_t rounds = 0;
 };
 
+/// What time is taken by, in ns: of the machine, and of the calling thread alone.
+struct BenchClocks {
+  std::function<double()> wall_ns, processor_ns;
+};
+BenchClocks machine_clocks();
+
 class InterleavedTiming {
  public:
+  explicit InterleavedTiming(BenchClocks clocks = machine_clocks()) : clocks_(std::move(clocks)) {}
+
   /// @param run makes so many calls.
   void add(std::function<void(int calls)> run);
 
@@ -36,8 +45,10 @@ class InterleavedTiming {
     std::vector<double> call_ns;  ///< one a round; NaN where it sat out
   };
 
-  static void calibrate(Entry& entry);
+  void calibrate(Entry& entry) const;
+  double timed_ns(const std::function<void(int)>& run, int calls) const;
 
+  BenchClocks clocks_;
   std::vector<Entry> entries_;
 };
 

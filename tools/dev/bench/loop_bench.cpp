@@ -24,6 +24,7 @@
 #include "dev/child_process.hpp"
 #include "softarm/base/clock.hpp"
 #include "softarm/base/realtime.hpp"
+#include "softarm/base/time.hpp"
 #include "softarm/config/load.hpp"
 #include "softarm/model/kinematics.hpp"
 #include "softarm/runtime/safety_monitor.hpp"
@@ -31,6 +32,7 @@
 #include "softarm/transport/message_decoding.hpp"
 #include "softarm/transport/mocap_adapter.hpp"
 #include "softarm/transport/settings.hpp"
+#include "softarm/transport/softarm_mocap.hpp"
 
 namespace softarm {
 namespace {
@@ -68,7 +70,7 @@ class Scene {
   Scene(const LoopBenchOptions& options, LoopScene& result)
       : options_(options),
         result_(result),
-        period_ns_(std::llround(1e9 / options.rate_hz)),
+        period_ns_(to_ns(1.0 / options.rate_hz)),
         folder_(std::filesystem::temp_directory_path() /
                 fmt::format("softarm_bench_loop_{}", getpid())) {
     std::filesystem::create_directories(folder_);
@@ -78,14 +80,14 @@ class Scene {
         "  lcm: {{url: \"udpm://239.255.76.67:{}?ttl=0\"}}\n"
         "  safety: {{arming: automatic, frame_period_s: 0.01, frame_latency_s: 0, hold_after_s: "
         "1,\n"
-        "    vent_after_s: 2, hold_overruns: 1000000, vent_overruns: 1000000, valve_readback: "
+        "    vent_after_s: 2, hold_overruns: 999999, vent_overruns: 1000000, valve_readback: "
         "false}}\n"
         "  realtime: {{fifo: {}, priority: {}, cpu: {}}}\n",
         std::filesystem::absolute(options.config).string(), kTheta_rad, options.rate_hz,
         20000 + getpid() % 40000, result.fifo, kPriority,
         options.cpu < 0 ? "any" : std::to_string(options.cpu));
     experiment_ = load_experiment(folder_ / "loop.yaml");
-    if (experiment_.transport.mocap.source != MocapSourceKind::softarm)
+    if (experiment_.transport.mocap.source != softarm_mocap())
       throw ConfigError(options.config, 0, "daemon.mocap.source",
                         "softarm, whose frames this bench sends", "another source");
     make_frames();
@@ -149,12 +151,14 @@ void Scene::make_frames() {
   MocapFrame frame;
   frame.segments = arm.size();
   frame.body[0] = {arm.base_position_m, Eigen::Quaterniond(arm.base_rotation), true};
+  const auto sent = std::make_unique<SentFrame>();
   for (std::size_t k = 0; k < frames_.size(); ++k) {
     for (std::size_t i = 0; i < ends.size(); ++i)
       frame.body[i + 1] = {
           ends[i].translation() + 1e-5 * static_cast<double>(k) * Eigen::Vector3d::UnitX(),
           Eigen::Quaterniond(ends[i].linear()), true};
-    MocapAdapter(experiment_.transport.bodies, arm).to_message(frame, 0, frames_[k]);
+    MocapAdapter(experiment_.transport.bodies, arm).to_sent(frame, 0, *sent);
+    to_message(*sent, frames_[k]);
   }
 }
 
@@ -190,7 +194,7 @@ void Scene::listen() {
 }
 
 bool Scene::wait_for(const std::function<bool()>& reached) {
-  const std::int64_t end_ns = monotonic_now_ns() + static_cast<std::int64_t>(1e9 * kPatience_s);
+  const std::int64_t end_ns = monotonic_now_ns() + to_ns(kPatience_s);
   while (!reached() && monotonic_now_ns() < end_ns) drive(0.05, [](const std::string&) {});
   return reached();
 }
@@ -198,7 +202,7 @@ bool Scene::wait_for(const std::function<bool()>& reached) {
 /// A frame to the daemon, a request to the echo, in turn, at random times.
 void Scene::drive(double seconds, const std::function<void(const std::string&)>& progress) {
   const std::int64_t start_ns = monotonic_now_ns();
-  const std::int64_t end_ns = start_ns + static_cast<std::int64_t>(1e9 * seconds);
+  const std::int64_t end_ns = start_ns + to_ns(seconds);
   std::uniform_int_distribution<std::int64_t> pause_ns(2'000'000, 4'000'000);
   for (std::int64_t next_ns = start_ns; next_ns < end_ns; next_ns += pause_ns(random_)) {
     while (monotonic_now_ns() < next_ns) node_->wait_until(next_ns);
@@ -212,8 +216,8 @@ void Scene::drive(double seconds, const std::function<void(const std::string&)>&
     sent_ns.push_back(now_ns);
     frame.capture_time_us = now_ns / 1000;
     node_->publish(to_echo ? kEchoRequest : experiment_.transport.lcm.mocap_channel, frame);
-    progress(fmt::format("{}: {:.0f} / {:.0f} s", result_.name,
-                         1e-9 * static_cast<double>(now_ns - start_ns), seconds));
+    progress(
+        fmt::format("{}: {:.0f} / {:.0f} s", result_.name, to_seconds(now_ns - start_ns), seconds));
   }
 }
 

@@ -1,47 +1,43 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <nlohmann/json.hpp>
 
 #include "dev/bench/loop_bench.hpp"
-#include "softarm/base/json_writer.hpp"
 
 namespace softarm {
 namespace {
 
-void write(JsonWriter& json, const char* key, const Durations& durations) {
-  json.key(key);
-  json.open_object();
-  json.member("count", durations.count);
-  json.member("p50_us", durations.p50_us);
-  json.member("p99_us", durations.p99_us);
-  json.member("largest_us", durations.largest_us);
-  json.close_object();
+using Json = nlohmann::ordered_json;
+
+Json json_of(const Durations& durations) {
+  return {{"count", durations.count},
+          {"p50_us", durations.p50_us},
+          {"p99_us", durations.p99_us},
+          {"largest_us", durations.largest_us}};
 }
 
-void write(JsonWriter& json, const LoopScene& scene) {
-  json.open_object();
-  json.member("name", scene.name);
-  json.member("fifo", scene.fifo);
-  json.member("busy_processes", scene.busy_processes);
-  if (scene.skipped.empty()) {
-    write(json, "echo", scene.echo);
-    write(json, "command", scene.command);
-    write(json, "wait", scene.wait);
-    write(json, "whole", scene.whole);
-    write(json, "bare_lateness", scene.bare_lateness);
-    write(json, "lateness", scene.lateness);
-    json.member("round_trip_p50_ratio", scene.round_trip_p50_ratio());
-    json.member("round_trip_p99_ratio", scene.round_trip_p99_ratio());
-    json.member("lateness_p99_ratio", scene.lateness_p99_ratio());
-    json.member("bare_missed", scene.bare_missed);
-    json.member("missed", scene.missed);
-    json.member("missed_asleep", scene.missed_asleep);
-    json.member("stolen_s", scene.stolen_s);
-    json.member("unanswered", scene.unanswered);
-  } else {
-    json.member("skipped", scene.skipped);
+Json json_of(const LoopScene& scene) {
+  Json json{{"name", scene.name}, {"fifo", scene.fifo}, {"busy_processes", scene.busy_processes}};
+  if (!scene.skipped.empty()) {
+    json["skipped"] = scene.skipped;
+    return json;
   }
-  json.close_object();
+  json.update({{"echo", json_of(scene.echo)},
+               {"command", json_of(scene.command)},
+               {"wait", json_of(scene.wait)},
+               {"whole", json_of(scene.whole)},
+               {"bare_lateness", json_of(scene.bare_lateness)},
+               {"lateness", json_of(scene.lateness)},
+               {"round_trip_p50_ratio", scene.round_trip_p50_ratio()},
+               {"round_trip_p99_ratio", scene.round_trip_p99_ratio()},
+               {"lateness_p99_ratio", scene.lateness_p99_ratio()},
+               {"bare_missed", scene.bare_missed},
+               {"missed", scene.missed},
+               {"missed_asleep", scene.missed_asleep},
+               {"stolen_s", scene.stolen_s},
+               {"unanswered", scene.unanswered}});
+  return json;
 }
 
 std::string row(const char* what, const Durations& durations) {
@@ -84,19 +80,14 @@ std::string table(const LoopReport& report) {
 }
 
 std::string json(const LoopReport& report) {
-  JsonWriter json;
-  json.open_object();
-  write_build(json, report.build);
-  json.member("rate_hz", report.rate_hz);
-  json.member("seconds", report.seconds);
-  json.member("frame_bytes", report.frame_bytes);
-  json.member("command_bytes", report.command_bytes);
-  json.key("scenes");
-  json.open_array();
-  for (const LoopScene& scene : report.scenes) write(json, scene);
-  json.close_array();
-  json.close_object();
-  return json.text() + "\n";
+  Json json = json_of(report.build);
+  json.update({{"rate_hz", report.rate_hz},
+               {"seconds", report.seconds},
+               {"frame_bytes", report.frame_bytes},
+               {"command_bytes", report.command_bytes},
+               {"scenes", Json::array()}});
+  for (const LoopScene& scene : report.scenes) json["scenes"].push_back(json_of(scene));
+  return json.dump() + "\n";
 }
 
 }  // namespace softarm

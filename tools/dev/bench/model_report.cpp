@@ -4,8 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
-
-#include "softarm/base/json_writer.hpp"
+#include <nlohmann/json.hpp>
 
 namespace softarm {
 namespace {
@@ -66,20 +65,44 @@ std::string ratios_table(const ModelReport& report) {
   return text;
 }
 
-void write_method(JsonWriter& json, const Method& method) {
-  json.open_object();
-  json.member("route", name(method.route));
-  json.member("coordinates", coordinates(method));
-  json.member("mass", name(method.mass));
-  json.close_object();
+using Json = nlohmann::ordered_json;
+
+Json json_of(const Method& method) {
+  return {{"route", name(method.route)},
+          {"coordinates", coordinates(method)},
+          {"mass", name(method.mass)}};
 }
 
-void write_error(JsonWriter& json, const char* key, const LargestError& error) {
-  json.key(key);
-  json.open_object();
-  json.member("largest_relative_error", error.states > 0 ? error.relative : std::nan(""));
-  json.member("states", error.states);
-  json.close_object();
+Json json_of(const LargestError& error) {
+  return {{"largest_relative_error", error.states > 0 ? error.relative : std::nan("")},
+          {"states", error.states}};
+}
+
+Json json_of(const MethodReport& method, const std::vector<int>& segments) {
+  Json times = Json::array();
+  for (std::size_t k = 0; k < method.times.size(); ++k) {
+    const CallTime& time = method.times[k];
+    if (time.rounds == 0) continue;
+    times.push_back({{"segments", segments[k]},
+                     {"median_ns", time.median_ns},
+                     {"lower_quartile_ns", time.lower_ns},
+                     {"upper_quartile_ns", time.upper_ns},
+                     {"rounds", time.rounds}});
+  }
+  return {{"method", json_of(method.method)},
+          {"times", std::move(times)},
+          {"exponent_6_to_100", method.exponent},
+          {"golden", json_of(method.golden)},
+          {"sweep", json_of(method.sweep)}};
+}
+
+Json json_of(const RatioReport& ratio, const std::vector<int>& segments) {
+  Json ratios = Json::array();
+  for (std::size_t k = 0; k < ratio.ratios.size(); ++k)
+    if (std::isfinite(ratio.ratios[k]))
+      ratios.push_back(Json{{"segments", segments[k]}, {"ratio", ratio.ratios[k]}});
+  return {
+      {"slow", json_of(ratio.slow)}, {"fast", json_of(ratio.fast)}, {"ratios", std::move(ratios)}};
 }
 
 }  // namespace
@@ -99,68 +122,24 @@ std::string table(const ModelReport& report) {
                 : "not in this build (liborocos-kdl-dev)");
 }
 
-void write_build(JsonWriter& json, const BenchBuild& build) {
-  json.member("compiler", build.compiler);
-  json.member("flags", build.flags);
-  json.member("instruction_set", build.instruction_set);
-  json.member("processor", build.processor);
-  json.member("load", build.load);
+Json json_of(const BenchBuild& build) {
+  return {{"compiler", build.compiler},
+          {"flags", build.flags},
+          {"instruction_set", build.instruction_set},
+          {"processor", build.processor},
+          {"load", build.load}};
 }
 
 std::string json(const ModelReport& report) {
-  JsonWriter json;
-  json.open_object();
-  write_build(json, report.build);
-  json.member("kdl", report.build.has_kdl);
-  json.key("methods");
-  json.open_array();
-  for (const MethodReport& method : report.methods) {
-    json.open_object();
-    json.key("method");
-    write_method(json, method.method);
-    json.key("times");
-    json.open_array();
-    for (std::size_t k = 0; k < method.times.size(); ++k) {
-      const CallTime& time = method.times[k];
-      if (time.rounds == 0) continue;
-      json.open_object();
-      json.member("segments", report.segments[k]);
-      json.member("median_ns", time.median_ns);
-      json.member("lower_quartile_ns", time.lower_ns);
-      json.member("upper_quartile_ns", time.upper_ns);
-      json.member("rounds", static_cast<std::int64_t>(time.rounds));
-      json.close_object();
-    }
-    json.close_array();
-    json.member("exponent_6_to_100", method.exponent);
-    write_error(json, "golden", method.golden);
-    write_error(json, "sweep", method.sweep);
-    json.close_object();
-  }
-  json.close_array();
-  json.key("ratios");
-  json.open_array();
-  for (const RatioReport& ratio : report.ratios) {
-    json.open_object();
-    json.key("slow");
-    write_method(json, ratio.slow);
-    json.key("fast");
-    write_method(json, ratio.fast);
-    json.key("ratios");
-    json.open_array();
-    for (std::size_t k = 0; k < ratio.ratios.size(); ++k) {
-      if (!std::isfinite(ratio.ratios[k])) continue;
-      json.open_object();
-      json.member("segments", report.segments[k]);
-      json.member("ratio", ratio.ratios[k]);
-      json.close_object();
-    }
-    json.close_array();
-    json.close_object();
-  }
-  json.close_array();
-  json.close_object();
-  return json.text() + "\n";
+  Json json = json_of(report.build);
+  json["kdl"] = report.build.has_kdl;
+  json["methods"] = Json::array();
+  for (const MethodReport& method : report.methods)
+    json["methods"].push_back(json_of(method, report.segments));
+  json["ratios"] = Json::array();
+  for (const RatioReport& ratio : report.ratios)
+    json["ratios"].push_back(json_of(ratio, report.segments));
+  return json.dump() + "\n";
 }
 
 }  // namespace softarm

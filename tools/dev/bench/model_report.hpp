@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 
@@ -11,16 +12,14 @@
 
 namespace softarm {
 
-class JsonWriter;
-
 /// The machine and the build: without them no time means anything.
 struct BenchBuild {
   std::string compiler, flags, instruction_set, processor, load;
   bool has_kdl = false;
 };
 BenchBuild bench_build();
-/// Its members into the open object.
-void write_build(JsonWriter& json, const BenchBuild& build);
+/// As the first members of a report.
+nlohmann::ordered_json json_of(const BenchBuild& build);
 
 /// One method over all n.
 struct MethodReport {

@@ -4,7 +4,7 @@
 #include <Eigen/Core>
 #include <memory>
 
-#include "simulation/second_order_system.hpp"
+#include "softarm/simulation/second_order_system.hpp"
 
 namespace softarm {
 
@@ -16,7 +16,7 @@ class PlainCvode {
   ~PlainCvode();
 
   void reset(double t_s, const Eigen::VectorXd& x, const Eigen::VectorXd& v);
-  void input_jumped();           ///< starts anew
+  void input_jumped();           ///< starts again
   void advance(double t_end_s);  ///< @throw std::runtime_error
   Eigen::VectorXd x() const;
 

@@ -3,8 +3,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
-
-#include "softarm/base/json_writer.hpp"
+#include <nlohmann/json.hpp>
 
 namespace softarm {
 namespace {
@@ -13,20 +12,21 @@ std::string number(double value, const char* unit = "") {
   return std::isfinite(value) ? fmt::format("{:.{}f}{}", value, value < 10.0 ? 1 : 0, unit) : "-";
 }
 
-void write_trial(JsonWriter& json, const TrialReport& report) {
-  json.open_object();
-  json.member("plant", report.plant);
-  json.member("scene", name(report.scene));
-  json.member("method", report.trial.label);
-  json.member("relative_tolerance", report.trial.tolerance);
-  json.member("error_rad", report.error_rad);
-  json.member("real_time_factor", report.factor);
-  json.member("times_plain_cvode", report.rival_ratio);
-  json.member("steps", report.counters.steps);
-  json.member("residuals", report.counters.residual_evaluations);
-  json.member("linearizations", report.counters.linearizations);
-  if (!report.failure.empty()) json.member("failure", report.failure);
-  json.close_object();
+using Json = nlohmann::ordered_json;
+
+Json json_of(const TrialReport& report) {
+  Json json{{"plant", report.plant},
+            {"scene", name(report.scene)},
+            {"method", report.trial.label},
+            {"relative_tolerance", report.trial.tolerance},
+            {"error_rad", report.error_rad},
+            {"real_time_factor", report.factor},
+            {"times_plain_cvode", report.rival_ratio},
+            {"steps", report.counters.steps},
+            {"residuals", report.counters.residual_evaluations},
+            {"linearizations", report.counters.linearizations}};
+  if (!report.failure.empty()) json["failure"] = report.failure;
+  return json;
 }
 
 }  // namespace
@@ -44,8 +44,7 @@ std::string name(Scene scene) {
 }
 
 std::string name(IntegratorMethod method) {
-  constexpr const char* kNames[] = {"sdirk2",    "cash4",       "sdirk4", "erk",
-                                    "cvode_bdf", "cvode_adams", "ida"};
+  constexpr const char* kNames[] = {"sdirk2", "cash4", "sdirk4", "erk", "cvode_bdf"};
   return kNames[static_cast<std::size_t>(method)];
 }
 
@@ -79,28 +78,18 @@ std::string table(const PlantReport& report) {
 }
 
 std::string json(const PlantReport& report) {
-  JsonWriter json;
-  json.open_object();
-  write_build(json, report.build);
-  json.member("rounds", report.rounds);
-  json.member("duration_s", report.duration_s);
-  json.key("trials");
-  json.open_array();
-  for (const TrialReport& one : report.trials) write_trial(json, one);
-  json.close_array();
-  json.key("pieces");
-  json.open_array();
-  for (const PiecesReport& one : report.pieces) {
-    json.open_object();
-    json.member("pieces", one.pieces);
-    json.member("tip_error_m", one.tip_error_m);
-    json.member("error_rad", one.error_rad);
-    json.member("real_time_factor", one.factor);
-    json.close_object();
-  }
-  json.close_array();
-  json.close_object();
-  return json.text() + "\n";
+  Json json = json_of(report.build);
+  json["rounds"] = report.rounds;
+  json["duration_s"] = report.duration_s;
+  json["trials"] = Json::array();
+  for (const TrialReport& one : report.trials) json["trials"].push_back(json_of(one));
+  json["pieces"] = Json::array();
+  for (const PiecesReport& one : report.pieces)
+    json["pieces"].push_back({{"pieces", one.pieces},
+                              {"tip_error_m", one.tip_error_m},
+                              {"error_rad", one.error_rad},
+                              {"real_time_factor", one.factor}});
+  return json.dump() + "\n";
 }
 
 }  // namespace softarm

@@ -1,4 +1,4 @@
-// softarm-dev bench plant: what is measured, and how it is told.
+// softarm-dev bench plant: what is measured, and how it is printed.
 #pragma once
 
 #include <functional>

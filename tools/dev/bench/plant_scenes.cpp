@@ -7,6 +7,8 @@
 #include <numbers>
 
 #include "dev/bench/plain_cvode.hpp"
+#include "softarm/base/clock.hpp"
+#include "softarm/base/time.hpp"
 #include "softarm/simulation/plant_error.hpp"
 
 namespace softarm {
@@ -15,18 +17,12 @@ namespace {
 constexpr double kHold_s = 1e-3;
 constexpr int kHoldsPerSample = 20;
 
-double processor_time_s() {
-  timespec time{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
-  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
-}
-
 /// A plant under the smooth drive or under a force held.
 class DrivenSystem final : public SecondOrderSystem {
  public:
   DrivenSystem(const PlantSettings& settings, Scene scene)
       : settings_(settings),
-        plant_(make_plant_system(settings)),
+        plant_(settings.kind.make(settings)),
         smooth_(scene == Scene::smooth),
         force_(Eigen::VectorXd::Zero(settings.arm.dof())) {
     hold(force_);
@@ -100,27 +96,25 @@ Eigen::VectorXd smooth_drive_nm(const PlantSettings& settings, double t_s) {
   return force;
 }
 
-PlantSettings bench_arm(PlantKind kind, MassModel mass, int pieces) {
+PlantSettings bench_arm(const PlantKind& kind, MassModel mass) {
   PlantSettings settings;
-  const int n = kind == PlantKind::links ? 4 : 3;
   settings.kind = kind;
   settings.arm.mass = mass;
-  settings.arm.segments.assign(static_cast<std::size_t>(n), SegmentParameters{});
-  if (kind == PlantKind::links) {  // the arm of section VI
-    settings.arm.segments.assign(static_cast<std::size_t>(n), {.length_m = 0.25,
-                                                               .mass_kg = 0.25,
-                                                               .stiffness_nm_per_rad = 2.0,
-                                                               .damping_nms_per_rad = 0.5});
+  settings.arm.segments.assign(3, SegmentParameters{});
+  if (kind.get_if<LinkSettings>() != nullptr) {
+    settings.arm.segments.assign(4, {.length_m = 0.25,
+                                     .mass_kg = 0.25,
+                                     .stiffness_nm_per_rad = 2.0,
+                                     .damping_nms_per_rad = 0.5});
   }
-  settings.refined.pieces = settings.links.links_per_segment = pieces;
   return settings;
 }
 
 std::vector<BenchPlant> bench_plants() {
-  return {{"pcc point", bench_arm(PlantKind::pcc, MassModel::point, 1)},
-          {"pcc distributed", bench_arm(PlantKind::pcc, MassModel::distributed, 1)},
-          {"refined 3x8", bench_arm(PlantKind::refined, MassModel::distributed, 8)},
-          {"links 4x6", bench_arm(PlantKind::links, MassModel::distributed, 6)}};
+  return {{"pcc point", bench_arm(PccSettings{}, MassModel::point)},
+          {"pcc distributed", bench_arm(PccSettings{}, MassModel::distributed)},
+          {"refined 3x8", bench_arm(RefinedSettings{}, MassModel::distributed)},
+          {"links 4x6", bench_arm(LinkSettings{}, MassModel::distributed)}};
 }
 
 PlantRun run_plant(const PlantSettings& settings, Scene scene, const Trial& trial,
@@ -141,10 +135,10 @@ PlantRun run_plant(const PlantSettings& settings, Scene scene, const Trial& tria
   try {
     if (trial.plain_cvode) {
       PlainCvode solver(system, trial.tolerance, absolute, scene != Scene::held);
-      const double start_s = processor_time_s();
+      const double start_s = to_seconds(thread_cpu_ns());
       solver.reset(0.0, x, rest);
       drive_through(solver, system, settings, scene, duration_s, run.samples);
-      run.seconds = processor_time_s() - start_s;
+      run.seconds = to_seconds(thread_cpu_ns()) - start_s;
       return run;
     }
     const auto solver =
@@ -154,10 +148,10 @@ PlantRun run_plant(const PlantSettings& settings, Scene scene, const Trial& tria
                                  .absolute_tolerance_velocity = kVelocityTolerance * absolute,
                                  .max_step_s = trial.max_step_s,
                                  .smooth_input = scene != Scene::held});
-    const double start_s = processor_time_s();
+    const double start_s = to_seconds(thread_cpu_ns());
     solver->reset(0.0, x, rest);
     drive_through(*solver, system, settings, scene, duration_s, run.samples);
-    run.seconds = processor_time_s() - start_s;
+    run.seconds = to_seconds(thread_cpu_ns()) - start_s;
     run.counters = solver->counters();
   } catch (const PlantError& error) {
     run.failure = error.cause;

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "simulation/integrator.hpp"
-#include "simulation/plant_system.hpp"
+#include "softarm/simulation/plant_system.hpp"
 #include "softarm/simulation/settings.hpp"
 
 namespace softarm {
@@ -24,8 +24,8 @@ struct BenchPlant {
 
 /// pcc point and distributed (n = 3), refined (n = 3, 8 pieces), links (4 segments of 6).
 std::vector<BenchPlant> bench_plants();
-/// The paper's arm in `pieces` pieces a segment.
-PlantSettings bench_arm(PlantKind kind, MassModel mass, int pieces);
+/// The paper's arm; of links, that of section VI.
+PlantSettings bench_arm(const PlantKind& kind, MassModel mass);
 
 /// Generalized force on every segment i (2n, N m): 0.4 k_i (1 - exp(-(t / 0.3 s)^2)) (sin w_i,
 /// cos w_i), w_i = 2 pi 0.7 Hz t + i pi / 3.

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <utility>
 
+#include "softarm/base/time.hpp"
+
 namespace softarm {
 namespace {
 
@@ -150,7 +152,7 @@ void FaultInjector::take(const mocap_frame_t& sent, std::int64_t now_ns) {
     frame.capture_time_us += static_cast<std::int64_t>(1e6 * fault_.amount);
   spoil_poses(frame);
   const double delay_s = fault_.kind == FaultKind::delay ? fault_.amount : 0.0;
-  const std::int64_t due_ns = now_ns + static_cast<std::int64_t>(1e9 * delay_s);
+  const std::int64_t due_ns = now_ns + to_ns(delay_s);
   if (fault_.kind == FaultKind::reorder && !kept_) {
     kept_ = frame;
     return;
@@ -172,7 +174,7 @@ bool FaultInjector::next(std::int64_t now_ns, mocap_frame_t& frame) {
 }
 
 std::int64_t FaultInjector::next_due_ns() const {
-  return waiting_.empty() ? kNever : waiting_.front().due_ns;
+  return waiting_.empty() ? kForever : waiting_.front().due_ns;
 }
 
 bool FaultInjector::pass(softarm_messages::pressure_measurement_t& measurement) const {

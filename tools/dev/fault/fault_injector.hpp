@@ -11,6 +11,8 @@
 #include <string>
 #include <vector>
 
+#include "softarm/base/time.hpp"
+
 namespace softarm {
 
 /// What may happen to messages. `Fault::amount` is a number of the unit that `fault_list` names.
@@ -59,8 +61,6 @@ std::optional<Fault> find_fault(const std::string& name);
 /// Pure: time is an argument, in ns of one monotonic clock.
 class FaultInjector {
  public:
-  static constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::max();
-
   /// From the next message on.
   void set(const Fault& fault);
 
@@ -68,7 +68,7 @@ class FaultInjector {
   void take(const softarm_messages::mocap_frame_t& frame, std::int64_t now_ns);
   /// The next frame that is due by `now_ns`, spoilt; false where there is none.
   bool next(std::int64_t now_ns, softarm_messages::mocap_frame_t& frame);
-  /// When the next one is due; kNever where none waits.
+  /// When the next one is due; kForever where none waits.
   std::int64_t next_due_ns() const;
 
   /// Spoils measured pressures; false: they do not go through.

@@ -55,10 +55,7 @@ void FaultRelay::work(const std::stop_token& stop) {
 
 void FaultRelay::send_what_is_due() {
   const std::lock_guard lock(mutex_);
-  while (injector_.next(monotonic_now_ns(), sent_)) {
-    node_.publish(lcm_.mocap_channel, sent_);
-    ++frames_sent_;
-  }
+  while (injector_.next(monotonic_now_ns(), sent_)) node_.publish(lcm_.mocap_channel, sent_);
 }
 
 }  // namespace softarm

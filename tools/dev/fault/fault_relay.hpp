@@ -28,7 +28,6 @@ class FaultRelay {
   void set(const Fault& fault);
 
   std::int64_t frames_received() const { return frames_received_; }
-  std::int64_t frames_sent() const { return frames_sent_; }
 
  private:
   void work(const std::stop_token& stop);
@@ -38,7 +37,7 @@ class FaultRelay {
   LcmNode node_;
   std::mutex mutex_;
   FaultInjector injector_;
-  std::atomic<std::int64_t> frames_received_{0}, frames_sent_{0};
+  std::atomic<std::int64_t> frames_received_{0};
   softarm_messages::mocap_frame_t received_, sent_;
   softarm_messages::pressure_measurement_t measurement_;
   std::jthread thread_;

@@ -2,9 +2,10 @@
 #pragma once
 
 #include <algorithm>
-#include <cmath>
-#include <softarm_messages/pressure_command_t.hpp>
-#include <vector>
+#include <cstdint>
+
+#include "softarm/actuation/command_expiry.hpp"
+#include "softarm/transport/arm_messages.hpp"
 
 namespace softarm {
 
@@ -13,17 +14,19 @@ class CommandSteps {
  public:
   /// Largest change of a pressure from the command before this one, bar; 0 where that is not known,
   /// as commands between them were lost.
-  float take(const softarm_messages::pressure_command_t& command) {
-    const bool expired = command.time_us - time_us_ >= command.validity_us;
-    if (expired) before_bar_.assign(command.pressure_bar.size(), 0.0F);
+  double take(const ChamberCommand& command) {
+    const bool expired = has_expired(time_us_, command.validity_us, command.time_us);
+    if (expired) before_bar_.setZero(command.pressure_bar.size());
     // A number is left out where the daemon was held up for so long that its decision came too late
     // to be sent; 1 comes from a new daemon.
     const bool known = command.sequence == sequence_ + 1 ||
                        (expired && (command.sequence == sequence_ + 2 || command.sequence == 1));
-    float largest_bar = 0.0F;
-    for (std::size_t j = 0; known && j < std::min(before_bar_.size(), command.pressure_bar.size());
-         ++j)
-      largest_bar = std::max(largest_bar, std::abs(command.pressure_bar[j] - before_bar_[j]));
+    const Eigen::Index chambers = std::min(before_bar_.size(), command.pressure_bar.size());
+    const double largest_bar =
+        known && chambers > 0 ? (command.pressure_bar.head(chambers) - before_bar_.head(chambers))
+                                    .cwiseAbs()
+                                    .maxCoeff()
+                              : 0.0;
     sequence_ = command.sequence;
     time_us_ = command.time_us;
     before_bar_ = command.pressure_bar;
@@ -32,7 +35,7 @@ class CommandSteps {
 
  private:
   std::int64_t sequence_ = -1, time_us_ = 0;
-  std::vector<float> before_bar_;
+  PressureVector before_bar_;
 };
 
 }  // namespace softarm

@@ -3,11 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <random>
-#include <softarm_messages/deadman_t.hpp>
-#include <softarm_messages/operator_command_t.hpp>
-
-#include "softarm/base/clock.hpp"
-#include "softarm/transport/message_decoding.hpp"
 
 namespace softarm {
 namespace {
@@ -55,81 +50,65 @@ ReferenceSettings random_reference(int segments, double most_theta_rad, int pose
 }
 
 SoakArm::SoakArm(const Experiment& experiment)
-    : lcm_(experiment.transport.lcm),
-      lowest_bar_(experiment.actuation.min_pressure_bar),
+    : client_(experiment),
+      lowest_bar_(std::min(0.0, experiment.actuation.min_pressure_bar)),
       highest_bar_(experiment.actuation.max_pressure_bar),
       largest_step_bar_(
           kRounding *
           std::max(experiment.actuation.slew_bar_per_s, experiment.actuation.vent_bar_per_s) /
           experiment.rate_hz),
-      control_(experiment.control),
-      segments_(experiment.arm.dof() / 2),
       seed_(experiment.seed),
-      node_(lcm_.url),
-      followed_(static_cast<std::size_t>(segments_)),
-      next_reference_ns_(monotonic_now_ns()),
-      next_go_ns_(next_reference_ns_),
-      sequence_(next_reference_ns_) {
-  node_.subscribe(lcm_.status_channel, 4096, [this](const auto& packet) { take_status(packet); });
-  node_.subscribe(lcm_.command_channel, 4096, [this](const auto& packet) { take_command(packet); });
-  node_.subscribe(lcm_.plant_channel, 4096,
-                  [this](const ReceivedMessage& packet) { decode(packet.bytes, plant_); });
+      followed_rad_(SegmentVector::Zero(experiment.arm.dof())),
+      next_reference_ns_(client_.now_ns()),
+      next_go_ns_(next_reference_ns_) {
+  client_.on_status([this](const ArmStatus& newest) { take_status(newest); });
+  client_.on_command([this](const ChamberCommand& command) { take_command(command); });
 }
 
-void SoakArm::take_status(const ReceivedMessage& packet) {
-  if (!decode(packet.bytes, decoded_)) return;
-  if (decoded_.tick < status_.tick) {  // another daemon
+void SoakArm::take_status(const ArmStatus& newest) {
+  if (newest.tick < status_.tick) {  // another daemon
     ended_.ticks += status_.tick;
     ended_.overruns += status_.overruns;
   }
-  const bool begins = mode() != Mode::active && static_cast<Mode>(decoded_.mode) == Mode::active;
-  status_ = decoded_;
-  const bool refused = mode() == Mode::active && (status_.flags & status_.REFERENCE_LIMITED) != 0 &&
-                       monotonic_now_ns() - motion_began_ns_ > kSecond_ns;
+  const bool begins = mode() != Mode::active && newest.mode == Mode::active;
+  status_ = newest;
+  const bool refused = mode() == Mode::active && status_.reference_limited &&
+                       client_.now_ns() - motion_began_ns_ > kSecond_ns;
   if (begins || refused) begin_motion();
-  for (std::size_t i = 0; i < std::min(followed_.size(), status_.reference_u_rad.size()); ++i) {
-    const auto& u = status_.reference_u_rad[i];
-    const std::array<double, 2> now{static_cast<double>(u[0]), static_cast<double>(u[1])};
-    if (now[0] * followed_[i][0] + now[1] * followed_[i][1] < 0.0) ++straight_poses_;
-    followed_[i] = now;
-  }
+  const SegmentVector& now_rad = status_.reference_u_rad;
+  for (Eigen::Index k = 0; k < now_rad.size(); k += 2)
+    if (now_rad.segment<2>(k).dot(followed_rad_.segment<2>(k)) < 0.0) ++straight_poses_;
+  followed_rad_ = now_rad;
   active_in_row_ = mode() == Mode::active ? active_in_row_ + 1 : 0;
   seen_.insert({mode(), reason()});
 }
 
-void SoakArm::take_command(const ReceivedMessage& packet) {
-  if (!decode(packet.bytes, command_)) return;  // bytes of our own that are no command
+void SoakArm::take_command(const ChamberCommand& command) {
   ++commands_;
-  bool inside = static_cast<double>(steps_.take(command_)) <= largest_step_bar_;
-  for (const float each : command_.pressure_bar) {
-    const auto bar = static_cast<double>(each);
-    inside &= std::isfinite(bar) && bar >= std::min(0.0, lowest_bar_) && bar <= highest_bar_;
-  }
+  commanded_bar_ = command.pressure_bar;
+  const bool inside = steps_.take(command) <= largest_step_bar_ && commanded_bar_.allFinite() &&
+                      (commanded_bar_.array() >= lowest_bar_).all() &&
+                      (commanded_bar_.array() <= highest_bar_).all();
   if (!inside) ++outside_;
 }
 
 bool SoakArm::wait_for(const std::function<bool()>& reached, double patience_s) {
-  const std::int64_t end_ns = monotonic_now_ns() + static_cast<std::int64_t>(1e9 * patience_s);
-  for (std::int64_t now_ns = monotonic_now_ns(); now_ns < end_ns; now_ns = monotonic_now_ns()) {
-    if (reached()) return true;
-    speak(now_ns);
-    node_.wait_until(std::min({end_ns, next_reference_ns_, next_go_ns_}));
-    node_.drain(1000);
-  }
-  return reached();
+  return client_.wait_for(
+      [&] {
+        if (reached()) return true;
+        speak(client_.now_ns());
+        return false;
+      },
+      patience_s);
 }
 
 void SoakArm::speak(std::int64_t now_ns) {
   if (now_ns >= next_reference_ns_) {
-    publish_reference(now_ns);
+    send_reference(now_ns);
     next_reference_ns_ = now_ns + kReferencePeriod_ns;
   }
   if (now_ns >= next_go_ns_) {
-    if (dead_man_ != DeadMan::silent)
-      node_.publish(lcm_.deadman_channel,
-                    softarm_messages::deadman_t{
-                        .sequence = ++sequence_,
-                        .go = static_cast<std::int8_t>(dead_man_ == DeadMan::go ? 1 : 0)});
+    if (dead_man_ != DeadMan::silent) client_.send_go(dead_man_ == DeadMan::go);
     next_go_ns_ = now_ns + kGoPeriod_ns;
   }
 }
@@ -137,49 +116,31 @@ void SoakArm::speak(std::int64_t now_ns) {
 /// A live reference further than max_step_rad from the daemon's own is refused: so at first, where
 /// the arm is, and where a busy machine kept ours from being heard for a while.
 void SoakArm::begin_motion() {
-  const auto& from = status_.reference_u_rad.empty() ? status_.u_rad : status_.reference_u_rad;
-  SegmentVector u = SegmentVector::Zero(2 * segments_), rest = u;
-  for (std::size_t i = 0; i < std::min(followed_.size(), from.size()); ++i)
-    for (const int axis : {0, 1})
-      u[2 * static_cast<int>(i) + axis] =
-          static_cast<double>(from[i][static_cast<std::size_t>(axis)]);
-  motion_began_ns_ = monotonic_now_ns();
+  const ControllerSettings& control = client_.experiment().control;
+  const SegmentVector& reference_rad = status_.reference_u_rad;
+  const SegmentVector u_rad = reference_rad.allFinite() ? reference_rad : status_.u_rad;
+  motion_began_ns_ = client_.now_ns();
   reference_.emplace(
-      random_reference(segments_, std::min(kMostTheta_rad, 0.5 * control_.max_theta_rad), kPoses,
-                       ++seed_),
-      control_, segments_);
-  reference_->start(1e-9 * static_cast<double>(monotonic_now_ns()), u, rest);
+      random_reference(status_.segments(), std::min(kMostTheta_rad, 0.5 * control.max_theta_rad),
+                       kPoses, ++seed_),
+      control, status_.segments());
+  reference_->start(to_seconds(motion_began_ns_), u_rad, SegmentVector::Zero(u_rad.size()));
 }
 
-void SoakArm::publish_reference(std::int64_t now_ns) {
+void SoakArm::send_reference(std::int64_t now_ns) {
   if (!reference_) return;
-  reference_->sample(1e-9 * static_cast<double>(now_ns), sample_);
-  const auto list = [](const SegmentVector& from) {
-    return std::vector<double>(from.begin(), from.end());
-  };
-  reference_message_.sequence = ++sequence_;
-  reference_message_.dimension = static_cast<std::int16_t>(sample_.u.size());
-  reference_message_.u_rad = list(sample_.u);
-  reference_message_.velocity_radps = list(sample_.velocity);
-  reference_message_.acceleration_radps2 = list(sample_.acceleration);
-  node_.publish(lcm_.reference_channel, reference_message_);
+  reference_->sample(to_seconds(now_ns), sample_);
+  client_.send_reference(sample_.u, sample_.velocity, sample_.acceleration);
 }
-
-void SoakArm::request(std::int8_t what) {
-  node_.publish(lcm_.operator_channel,
-                softarm_messages::operator_command_t{.sequence = ++sequence_, .request = what});
-}
-
-void SoakArm::set_dead_man(DeadMan says) { dead_man_ = says; }
 
 int SoakArm::fullest_chamber() const {
-  const auto& bar = command_.pressure_bar;
-  return static_cast<int>(std::max_element(bar.begin(), bar.end()) - bar.begin());
+  Eigen::Index fullest = 0;
+  if (commanded_bar_.size() > 0) commanded_bar_.maxCoeff(&fullest);
+  return static_cast<int>(fullest);
 }
 
 double SoakArm::fullest_bar() const {
-  const auto& bar = command_.pressure_bar;
-  return bar.empty() ? 0.0 : static_cast<double>(*std::max_element(bar.begin(), bar.end()));
+  return commanded_bar_.size() > 0 ? commanded_bar_.maxCoeff() : 0.0;
 }
 
 bool SoakArm::left_active() const {

@@ -1,4 +1,4 @@
-// The people and the references of a soak, and what comes over the wire: one LCM handle.
+// The people and the references of a soak, and the account of what comes over the wire.
 #pragma once
 
 #include <array>
@@ -6,19 +6,13 @@
 #include <functional>
 #include <optional>
 #include <set>
-#include <softarm_messages/controller_status_t.hpp>
-#include <softarm_messages/curvature_reference_t.hpp>
-#include <softarm_messages/plant_state_t.hpp>
-#include <softarm_messages/pressure_command_t.hpp>
 #include <utility>
 #include <vector>
 
 #include "dev/soak/command_steps.hpp"
+#include "softarm/client/arm_client.hpp"
 #include "softarm/config/experiment.hpp"
 #include "softarm/control/reference.hpp"
-#include "softarm/runtime/safety_monitor.hpp"
-#include "softarm/transport/lcm_node.hpp"
-#include "softarm/transport/settings.hpp"
 
 namespace softarm {
 
@@ -37,19 +31,19 @@ class SoakArm {
   /// Handles messages and speaks until `reached`, or `patience_s` have passed; says which.
   bool wait_for(const std::function<bool()>& reached, double patience_s);
 
-  /// An operator's request, softarm_messages::operator_command_t::ARM ...
-  void request(std::int8_t what);
+  /// An operator's request, sent once.
+  void request(OperatorRequest what) { client_.send(what); }
   /// What the dead man says from now on.
   enum class DeadMan { go, let_go, silent };
-  void set_dead_man(DeadMan says);
+  void set_dead_man(DeadMan says) { dead_man_ = says; }
 
-  Mode mode() const { return static_cast<Mode>(status_.mode); }
-  Reason reason() const { return static_cast<Reason>(status_.reason); }
-  const softarm_messages::controller_status_t& status() const { return status_; }
+  Mode mode() const { return status_.mode; }
+  Reason reason() const { return status_.reason; }
+  const ArmStatus& status() const { return status_; }
   /// Statuses in a row, up to the newest, that say ACTIVE.
   int active_in_row() const { return active_in_row_; }
   void count_active_anew() { active_in_row_ = 0; }
-  bool plant_vented() const { return plant_.vented != 0; }
+  bool plant_vented() const { return client_.plant() && client_.plant()->vented; }
   /// The chamber with the highest commanded pressure, and that pressure.
   int fullest_chamber() const;
   double fullest_bar() const;
@@ -68,23 +62,19 @@ class SoakArm {
   std::int64_t straight_poses() const { return straight_poses_; }
 
  private:
-  void take_status(const ReceivedMessage& packet);
-  void take_command(const ReceivedMessage& packet);
+  void take_status(const ArmStatus& newest);
+  void take_command(const ChamberCommand& command);
   void speak(std::int64_t now_ns);
   void begin_motion();
-  void publish_reference(std::int64_t now_ns);
+  void send_reference(std::int64_t now_ns);
 
-  LcmSettings lcm_;
+  ArmClient client_;
   double lowest_bar_, highest_bar_, largest_step_bar_;
-  ControllerSettings control_;
-  int segments_;
   std::uint64_t seed_;
-  LcmNode node_;
   std::optional<Reference> reference_;  ///< since the daemon has been ACTIVE for the first time
   ReferenceSample sample_;
-  std::vector<std::array<double, 2>> followed_;  ///< u of the daemon's reference, rad
+  SegmentVector followed_rad_;  ///< the daemon's reference before
   std::int64_t next_reference_ns_, next_go_ns_, motion_began_ns_ = 0;
-  std::int64_t sequence_;
   DeadMan dead_man_ = DeadMan::go;
   std::set<std::pair<Mode, Reason>> seen_;
   int active_in_row_ = 0;
@@ -92,11 +82,9 @@ class SoakArm {
     std::int64_t ticks = 0, overruns = 0;
   } ended_;  // daemons
   std::int64_t commands_ = 0, outside_ = 0, straight_poses_ = 0;
-  softarm_messages::controller_status_t status_{}, decoded_{};
-  softarm_messages::plant_state_t plant_{};
-  softarm_messages::pressure_command_t command_{};
+  ArmStatus status_;
+  PressureVector commanded_bar_;
   CommandSteps steps_;
-  softarm_messages::curvature_reference_t reference_message_{};
 };
 
 }  // namespace softarm

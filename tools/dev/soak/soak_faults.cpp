@@ -5,13 +5,11 @@
 namespace softarm {
 namespace {
 
-using Status = softarm_messages::controller_status_t;
-
 constexpr SoakFault frames_away(const char* name, const char* relay_fault, double amount = 0.0) {
   return {name, SoakAction::relay, relay_fault, amount, Mode::vent, Reason::frames_stale};
 }
 constexpr SoakFault harmless(const char* name, const char* relay_fault,
-                             std::int32_t Status::*counter, int counts, double amount = 0.0) {
+                             std::int64_t ArmStatus::*counter, int counts, double amount = 0.0) {
   return {name,         SoakAction::relay, relay_fault, amount,
           Mode::active, Reason::none,      counter,     counts};
 }
@@ -25,11 +23,11 @@ constexpr std::array kFaults{
     frames_away("length", "length"),
     frames_away("swap", "swap"),
     frames_away("delay 0.3 s", "delay", 0.3),
-    harmless("delay 0.03 s", "delay", &Status::frames_accepted, 100, 0.03),
-    harmless("clock + 1 h", "clock", &Status::frames_accepted, 100),
-    harmless("duplicate", "duplicate", &Status::frames_repeated, 50),
-    harmless("reorder", "reorder", &Status::frames_rejected, 50),
-    harmless("jump", "jump", &Status::frames_rejected, 10),
+    harmless("delay 0.03 s", "delay", &ArmStatus::frames_accepted, 100, 0.03),
+    harmless("clock + 1 h", "clock", &ArmStatus::frames_accepted, 100),
+    harmless("duplicate", "duplicate", &ArmStatus::frames_repeated, 50),
+    harmless("reorder", "reorder", &ArmStatus::frames_rejected, 50),
+    harmless("jump", "jump", &ArmStatus::frames_rejected, 10),
     SoakFault{"restart", SoakAction::relay, "restart", 0.0, Mode::vent, Reason::sender_restarted},
     SoakFault{"freeze", SoakAction::relay, "freeze", 0.0, Mode::hold, Reason::poses_frozen},
     SoakFault{"valves silent", SoakAction::relay, "silence", 0.0, Mode::fault,
@@ -43,9 +41,9 @@ constexpr std::array kFaults{
     SoakFault{"dead man silent", SoakAction::fall_silent, "", 0.0, Mode::vent,
               Reason::deadman_released},
     SoakFault{"hostile bytes", SoakAction::hostile, "", 0.0, Mode::active, Reason::none,
-              &Status::messages_malformed, 100},
+              &ArmStatus::messages_malformed, 100},
     SoakFault{"flood", SoakAction::flood, "", 0.0, Mode::active, Reason::none,
-              &Status::messages_malformed, 100},
+              &ArmStatus::messages_malformed, 100},
     SoakFault{"daemon stopped", SoakAction::pause_daemon, "", 0.0, Mode::vent, Reason::time_gap},
     SoakFault{"plant stopped", SoakAction::pause_plant, "", 0.0, Mode::vent, Reason::frames_stale},
     SoakFault{"plant replaced", SoakAction::restart_plant, "", 0.0, Mode::vent,

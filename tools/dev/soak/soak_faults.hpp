@@ -2,10 +2,10 @@
 #pragma once
 
 #include <cstdint>
-#include <softarm_messages/controller_status_t.hpp>
 #include <span>
 
 #include "softarm/runtime/safety_monitor.hpp"
+#include "softarm/transport/arm_messages.hpp"
 
 namespace softarm {
 
@@ -34,7 +34,7 @@ struct SoakFault {
   double amount = 0.0;  ///< of the relay's fault; 0: as usual
   Mode mode = Mode::active;
   Reason reason = Reason::none;
-  std::int32_t softarm_messages::controller_status_t::*counter = nullptr;
+  std::int64_t ArmStatus::*counter = nullptr;
   int counts = 0;  ///< how far the counter must go on
 
   /// A process is replaced, so that nothing can be said of its memory over the whole run.

@@ -2,25 +2,35 @@
 
 #include <fmt/format.h>
 
-#include "softarm/base/json_writer.hpp"
+#include <nlohmann/json.hpp>
 
 namespace softarm {
 namespace {
 
-void add_use(JsonWriter& json, const char* key, const ProcessUse& use) {
-  json.key(key);
-  json.open_object();
-  json.member("resident_kib", use.resident_kib);
-  json.member("anonymous_kib", use.anonymous_kib);
-  json.member("descriptors", use.descriptors);
-  json.close_object();
+using Json = nlohmann::ordered_json;
+
+Json json_of(const ProcessUse& use) {
+  return {{"resident_kib", use.resident_kib},
+          {"anonymous_kib", use.anonymous_kib},
+          {"descriptors", use.descriptors}};
 }
 
-void add_list(JsonWriter& json, const char* key, const std::vector<std::string>& lines) {
-  json.key(key);
-  json.open_array();
-  for (const std::string& line : lines) json.value(line);
-  json.close_array();
+Json json_of(const FaultCount& fault) {
+  return {{"name", fault.name},
+          {"injected", fault.injected},
+          {"answered", fault.answered},
+          {"recovered", fault.recovered},
+          {"disturbed", fault.disturbed},
+          {"longest_answer_s", fault.longest_answer_s},
+          {"longest_recovery_s", fault.longest_recovery_s}};
+}
+
+Json json_of(const ProcessRecord& process) {
+  return {{"name", process.name},
+          {"instances", process.instances},
+          {"at_start", json_of(process.at_start)},
+          {"after_warm_up", json_of(process.after_warm_up)},
+          {"at_end", json_of(process.at_end)}};
 }
 
 }  // namespace
@@ -103,49 +113,25 @@ std::string report_text(const SoakCounters& counters) {
 }
 
 std::string report_json(const SoakCounters& counters) {
-  JsonWriter json;
-  json.open_object();
-  json.member("duration_s", counters.duration_s);
-  json.member("warm_up_s", counters.warm_up_s);
-  json.member("rate_hz", counters.rate_hz);
-  json.member("ticks", counters.ticks);
-  json.member("overruns", counters.overruns);
-  json.member("overruns_while_stopped", counters.overruns_while_stopped);
-  json.member("commands", counters.commands);
-  json.member("commands_outside_limits", counters.commands_outside_limits);
-  json.member("straight_poses", counters.straight_poses);
-  json.member("unprovoked", counters.unprovoked);
-  json.member("injected", counters.injected());
-  json.member("recovered", counters.recovered());
-  json.key("faults");
-  json.open_array();
-  for (const FaultCount& fault : counters.faults) {
-    json.open_object();
-    json.member("name", fault.name);
-    json.member("injected", fault.injected);
-    json.member("answered", fault.answered);
-    json.member("recovered", fault.recovered);
-    json.member("disturbed", fault.disturbed);
-    json.member("longest_answer_s", fault.longest_answer_s);
-    json.member("longest_recovery_s", fault.longest_recovery_s);
-    json.close_object();
-  }
-  json.close_array();
-  json.key("processes");
-  json.open_array();
-  for (const ProcessRecord& process : counters.processes) {
-    json.open_object();
-    json.member("name", process.name);
-    json.member("instances", process.instances);
-    add_use(json, "at_start", process.at_start);
-    add_use(json, "after_warm_up", process.after_warm_up);
-    add_use(json, "at_end", process.at_end);
-    json.close_object();
-  }
-  json.close_array();
-  add_list(json, "failures", failures(counters));
-  json.close_object();
-  return json.text() + "\n";
+  Json json{{"duration_s", counters.duration_s},
+            {"warm_up_s", counters.warm_up_s},
+            {"rate_hz", counters.rate_hz},
+            {"ticks", counters.ticks},
+            {"overruns", counters.overruns},
+            {"overruns_while_stopped", counters.overruns_while_stopped},
+            {"commands", counters.commands},
+            {"commands_outside_limits", counters.commands_outside_limits},
+            {"straight_poses", counters.straight_poses},
+            {"unprovoked", counters.unprovoked},
+            {"injected", counters.injected()},
+            {"recovered", counters.recovered()},
+            {"faults", Json::array()},
+            {"processes", Json::array()},
+            {"failures", failures(counters)}};
+  for (const FaultCount& fault : counters.faults) json["faults"].push_back(json_of(fault));
+  for (const ProcessRecord& process : counters.processes)
+    json["processes"].push_back(json_of(process));
+  return json.dump() + "\n";
 }
 
 }  // namespace softarm

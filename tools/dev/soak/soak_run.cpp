@@ -5,12 +5,12 @@
 #include <algorithm>
 #include <fstream>
 #include <numeric>
-#include <softarm_messages/operator_command_t.hpp>
 
 #include "apps/program.hpp"
 #include "apps/progress.hpp"
 #include "apps/signals.hpp"
 #include "softarm/base/clock.hpp"
+#include "softarm/base/time.hpp"
 #include "softarm/config/load.hpp"
 #include "softarm/transport/settings.hpp"
 
@@ -18,7 +18,6 @@ namespace softarm {
 namespace {
 
 using namespace std::chrono_literals;
-using Request = softarm_messages::operator_command_t;
 
 constexpr double kPatience_s = 15.0;
 constexpr int kSteadyStatuses = 50;  ///< ACTIVE in a row: recovered
@@ -60,15 +59,13 @@ SoakRun::SoakRun(const SoakOptions& options)
   if (experiment_.actuation.kind == ActuationKind::torque)
     throw ConfigError(options.config, 0, "actuation.kind",
                       "chambers: a soak watches pressures and valves", "torque");
-  if (experiment_.transport.mocap.source != MocapSourceKind::softarm)
+  if (experiment_.transport.mocap.source != softarm_mocap())
     throw ConfigError(options.config, 0, "daemon.mocap.source",
                       "softarm, the only frames that a soak can spoil", "another source");
   for (const SoakFault& fault : soak_faults()) counters_.faults.push_back({.name = fault.name});
 }
 
-double SoakRun::passed_s() const {
-  return 1e-9 * static_cast<double>(monotonic_now_ns() - start_ns_);
-}
+double SoakRun::passed_s() const { return to_seconds(monotonic_now_ns() - start_ns_); }
 
 void SoakRun::start(Program& program) {
   const int number = program.process ? ++program.record.instances : 1;
@@ -119,9 +116,9 @@ bool SoakRun::operate_until_active(double patience_s) {
     if (arm_.wait_for(active, 0.2)) return true;
     look_after_processes();
     if (arm_.mode() == Mode::fault) {
-      arm_.request(Request::DISARM);
+      arm_.request(OperatorRequest::disarm);
     } else if (arm_.reason() == Reason::waiting_for_arm) {
-      arm_.request(Request::ARM);
+      arm_.request(OperatorRequest::arm);
     }
   }
   return active();
@@ -186,9 +183,9 @@ void SoakRun::cause(const SoakFault& fault) {
       return relay_.set(chosen);
     }
     case SoakAction::disarm:
-      return arm_.request(Request::DISARM);
+      return arm_.request(OperatorRequest::disarm);
     case SoakAction::emergency_stop:
-      return arm_.request(Request::EMERGENCY_STOP);
+      return arm_.request(OperatorRequest::emergency_stop);
     case SoakAction::let_go:
       return arm_.set_dead_man(SoakArm::DeadMan::let_go);
     case SoakAction::fall_silent:
@@ -222,7 +219,7 @@ void SoakRun::cause(const SoakFault& fault) {
   }
 }
 
-bool SoakRun::answered(const SoakFault& fault, int counter_before) {
+bool SoakRun::answered(const SoakFault& fault, std::int64_t counter_before) {
   if (fault.counter != nullptr)
     return arm_.wait_for(
         [&] { return arm_.status().*fault.counter >= counter_before + fault.counts; }, kPatience_s);
@@ -243,7 +240,7 @@ void SoakRun::clear(const SoakFault& fault) {
 void SoakRun::make(const SoakFault& fault, FaultCount& count) {
   ++count.injected;
   arm_.forget();
-  const int before = fault.counter != nullptr ? arm_.status().*fault.counter : 0;
+  const std::int64_t before = fault.counter != nullptr ? arm_.status().*fault.counter : 0;
   const double begin_s = passed_s();
   cause(fault);
   const bool seen = answered(fault, before);

@@ -54,7 +54,7 @@ class SoakRun {
   void wait_between_faults();
   const SoakFault& next_fault(double passed_s);
   void cause(const SoakFault& fault);
-  bool answered(const SoakFault& fault, int counter_before);
+  bool answered(const SoakFault& fault, std::int64_t counter_before);
   void clear(const SoakFault& fault);
   void make(const SoakFault& fault, FaultCount& count);
   void send_hostile_bytes();

@@ -1,56 +1,55 @@
-// From an arm that hangs still: where on its marker plates the frames S_i sit.
+// Calibration from an arm at rest: the marker frames, that is the poses of S_i on the tracked
+// bodies.
 #pragma once
 
 #include <Eigen/Core>
 #include <string>
 #include <vector>
 
-#include "commissioning/calibration/pose_statistics.hpp"
 #include "softarm/config/experiment.hpp"
 #include "softarm/estimation/mocap_frame.hpp"
+#include "softarm/estimation/pose_statistics.hpp"
 #include "softarm/transport/settings.hpp"
 
 namespace softarm {
 
-/// Where S_0 is taken from; the shape at rest is relative to it.
+/// The source of S_0; the shape at rest is relative to it.
 enum class BaseSource {
-  plate,  ///< from the body of the base with the plate configured (or arm.base, where it is fixed)
-  arm     ///< the same position, but the axis of the arm points where arm.base.rotation says
+  plate,  ///< the body of the base with the configured marker frame (or arm.base if it is fixed)
+  arm     ///< the same position, but with the axis of the arm along arm.base.rotation
 };
 
-/// What one segment reads at rest.
+/// The measured configuration of one segment at rest.
 struct RestReading {
   Eigen::Vector2d u_rad = Eigen::Vector2d::Zero();
   double twist_rad = 0.0;
   double length_error_m = 0.0;
-  bool valid = false;  ///< false: its pose fits no bend
+  bool valid = false;  ///< false: no bend fits its pose
 };
 
+/// The result of a calibration.
 struct RestCalibration {
-  std::vector<PoseStatistics> body;  ///< base first; a fixed base has seen no frames
-  Eigen::VectorXd rest_u_rad;        ///< 2n: the shape that the model has at rest without pressure
-  BodySettings bodies;               ///< as configured, with the plates found
-  double base_tilt_rad = 0.0;  ///< of S_0's axis from arm.base.rotation, with the plate configured
-  std::vector<RestReading> before;  ///< of every segment, with the plates configured
-  /// The second half of the frames with the plates that the first half alone gives.
+  std::vector<PoseStatistics> body;  ///< base first; no frames for a fixed base
+  Eigen::VectorXd rest_u_rad;        ///< 2n: shape of the model at rest without pressure
+  BodySettings bodies;               ///< as configured, with the marker frames found
+  double base_tilt_rad = 0.0;        ///< of S_0's axis from arm.base.rotation, as configured
+  std::vector<RestReading> before;   ///< of every segment, with the configured marker frames
+  /// Of the second half of the frames, with the marker frames from the first half alone.
   std::vector<RestReading> after;
 };
 
-/// u at rest: K u + G(u) = 0, nearest to straight.
-/// @throws std::runtime_error where Newton's method finds none
-Eigen::VectorXd rest_shape(const ArmParameters& arm);
-
-/// With B_i the mean pose of body i and T_i(u) the pose of S_i in S_0:
+/// Finds the marker frames. With B_i the mean pose of body i and T_i(u) the pose of S_i in S_0:
 ///   plate_i = B_i^-1 S_0 T_i(u_rest).
-/// @param frames body poses, as with plates of zero; only those in which every body is seen count
-/// @throws std::runtime_error, with numbers and cure, where there are too few, or the arm moves
+/// @param frames  poses of the bodies themselves; only frames that show every body count
+/// @throws std::runtime_error, with numbers and the fix, if there are too few or the arm moves
 RestCalibration calibrate_rest(const Experiment& experiment, const std::vector<MocapFrame>& frames,
                                BaseSource base);
 
-/// What it found, and what a still arm cannot tell; for people.
+/// The result for a person, including what an arm at rest cannot determine.
 std::string calibration_text(const Experiment& experiment, const RestCalibration& found);
 
-/// An experiment that includes `config` and has the plates; `note` becomes its first line.
+/// An experiment file that includes `config` and has the marker frames; `note` becomes its first
+/// line.
 std::string calibrated_yaml(const Experiment& experiment, const RestCalibration& found,
                             const std::string& note, const std::string& config);
 

@@ -1,4 +1,4 @@
-// What was identified, for people and as a configuration.
+// The result of an identification, as text and as a configuration.
 #pragma once
 
 #include <filesystem>
@@ -10,16 +10,17 @@
 
 namespace softarm {
 
-/// A line a parameter with its 95 % interval, then what is left over.
+/// One line per parameter with its 95 % interval, then the residual.
 std::string fit_table(const ParameterSet& set, const Refinement& fit);
-/// The same of least squares alone, with standard errors.
+/// The same for linear least squares alone, with standard errors.
 std::string linear_table(const ParameterSet& set, const LinearFit& fit);
-/// Singular values, the combination told least, and those that are not told at all.
+/// Singular values, the least determined combination, and those that are not determined.
 std::string conditioning_text(const ParameterSet& set, const Refinement& fit);
+/// The result of a coverage study as a table.
 std::string coverage_text(const CoverageTable& table);
 
-/// An experiment that includes `config` and has the arm found in place of the one believed; its
-/// plant stays as it is. `note` becomes a comment. The path of the include is seen from `output`.
+/// An experiment file that includes `config` and replaces the configured arm by the identified one;
+/// the plant is kept. `note` becomes a comment. The path of the include is relative to `output`.
 std::string identified_yaml(const Experiment& experiment, const ArmHypothesis& arm,
                             const FitChoice& choice, const std::string& note,
                             const std::filesystem::path& config,

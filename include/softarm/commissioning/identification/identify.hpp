@@ -1,4 +1,5 @@
-// A record to parameters: linear least squares for a start, then the simulated response.
+// From a record to parameters: linear least squares for a start, then fit of the simulated
+// response.
 #pragma once
 
 #include <vector>
@@ -8,14 +9,16 @@
 
 namespace softarm {
 
+/// Settings of `identify`.
 struct IdentifyOptions {
-  double window_s = 0.2;       ///< of the smoothing for the start
-  double longest_lag_s = 0.5;  ///< that the start considers
+  double window_s = 0.2;       ///< of the smoothing in the linear fit
+  double longest_lag_s = 0.5;  ///< considered by the linear fit
   RefinementOptions refinement;
-  /// Arms from which the search may start as well, if one is nearer than what least squares find.
+  /// Other arms from which the search may start, if one is nearer than the result of least squares.
   std::vector<ArmHypothesis> near;
 };
 
+/// Identifies the parameters of `set` from `record`.
 /// @throws std::runtime_error as `fit_linear` and `refine`
 Refinement identify(const ParameterSet& set, const MotionRecord& record,
                     const IdentifyOptions& options);

@@ -2,22 +2,30 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
 
 #include "softarm/commissioning/identification/motion_record.hpp"
 #include "softarm/config/experiment.hpp"
 
 namespace softarm {
 
-/// Which pressures drive the model.
+/// The pressures that drive the model.
 enum class LoggedInput {
-  commanded,  ///< set points, held from one to the next; commands in shadow count too
-  measured    ///< what sensors read, on straight lines between readings
+  commanded,  ///< set points, held from one to the next; including commands of a shadow
+  measured    ///< sensor readings, interpolated linearly
 };
 
-/// Frames and pressures of the experiment's channels; times in s since the first frame. Frames that
-/// are repeated, or do not show every segment, are left out.
-/// @throws std::runtime_error where the log cannot be read or holds too little of either
-MotionRecord read_log(const Experiment& experiment, const std::filesystem::path& log,
+/// The motion in a log.
+struct LoggedMotion {
+  MotionRecord record;
+  std::string damage;  ///< what was not used, for a person; empty: the log is intact
+};
+
+/// Reads frames and pressures of the experiment's channels; times are in s since the first frame.
+/// Frames that are repeated or do not show every segment are left out. Everything before and after
+/// damage is used.
+/// @throws std::runtime_error if the log cannot be read or contains too few frames or pressures
+LoggedMotion read_log(const Experiment& experiment, const std::filesystem::path& log,
                       LoggedInput input);
 
 }  // namespace softarm

@@ -1,4 +1,4 @@
-// Which numbers of an arm are sought, and how they change it.
+// The parameters of an arm that are identified, and how they change it.
 #pragma once
 
 #include <Eigen/Core>
@@ -12,22 +12,24 @@
 
 namespace softarm {
 
+/// Which chambers share one gain.
 enum class GainSharing {
   arm,      ///< one gain for all chambers
-  side,     ///< chamber j of every segment alike: the paper's four sides
-  segment,  ///< all chambers of a segment alike
-  chamber   ///< every chamber its own
+  side,     ///< one per side: chamber j of every segment (the paper's four sides)
+  segment,  ///< one per segment
+  chamber   ///< one per chamber
 };
 
+/// Which parameters are identified.
 struct FitChoice {
-  bool stiffness = true;     ///< false: as configured, where the record tells ratios only
+  bool stiffness = true;     ///< false: as configured, if the record determines only ratios
   bool damping = true;       ///< false: as configured
-  bool inertia = true;       ///< false: none, for motions so slow that it does not count
-  bool per_segment = false;  ///< k and beta of every segment, instead of one for all as in VII-B1
+  bool inertia = true;       ///< false: none, for quasi-static motion
+  bool per_segment = false;  ///< k and beta per segment, instead of one for all as in VII-B1
   GainSharing gains = GainSharing::chamber;
   bool gains_free = true;  ///< false: as configured (always with actuation by torque)
-  /// Into which direction a chamber pushes, too. Nothing is believed of its push then: the
-  /// configured gain is a scale.
+  /// Also identify the direction in which a chamber acts. There is no prior for its input map then:
+  /// the configured gain is only a scale.
   bool directions = false;
   bool lag = true;
   bool delay = true;
@@ -35,7 +37,7 @@ struct FitChoice {
   bool cubic = false;
 };
 
-/// One unknown. Everything is sought in units of its scale.
+/// One unknown. The search uses units of its scale.
 struct Parameter {
   std::string name;
   std::string unit;
@@ -43,26 +45,30 @@ struct Parameter {
   std::function<double(const ArmHypothesis&)> get;           ///< in its unit
   std::function<void(ArmHypothesis&, double value)> set;     ///< in its unit
   double lowest = -std::numeric_limits<double>::infinity();  ///< in its unit
-  double difference = 1e-5;                                  ///< over its scale: for sensitivities
+  double difference = 1e-5;  ///< step for sensitivities, in its scale
 };
 
+/// The unknowns of a choice. Vectors x have one number per unknown, in its scale.
 class ParameterSet {
  public:
-  /// Scales are taken from `start`, which also lends every number that is not sought.
+  /// Scales are taken from `start`, which also gives every number that is not identified.
   ParameterSet(const ArmHypothesis& start, ActuationKind kind, const FitChoice& choice);
 
+  /// Number of unknowns.
   Eigen::Index size() const { return static_cast<Eigen::Index>(parameters_.size()); }
+  /// One unknown, 0 <= i < size().
   const Parameter& operator[](Eigen::Index i) const {
     return parameters_[static_cast<std::size_t>(i)];
   }
 
-  Eigen::VectorXd of(const ArmHypothesis& arm) const;  ///< over their scales
-  Eigen::VectorXd believed() const { return of(start_); }
-  Eigen::VectorXd lowest() const;  ///< over their scales
+  Eigen::VectorXd of(const ArmHypothesis& arm) const;        ///< the unknowns of an arm
+  Eigen::VectorXd configured() const { return of(start_); }  ///< those of `start`, as configured
+  Eigen::VectorXd lowest() const;                            ///< lower limits
+  /// The arm with the unknowns x.
   ArmHypothesis arm(const Eigen::VectorXd& x) const;
-  /// Whether the arm is one: springs and damping that are not negative, no negative lag.
+  /// Whether the arm is physically possible: no negative stiffness, damping or lag.
   bool possible(const Eigen::VectorXd& x) const;
-  /// Whether (16) is linear in it.
+  /// Whether (16) is linear in this unknown.
   bool linear(Eigen::Index i) const;
 
  private:

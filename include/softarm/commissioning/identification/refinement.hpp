@@ -1,4 +1,4 @@
-// The parameters whose simulated response is nearest to the recorded one, and how sure they are.
+// The parameters whose simulated response is nearest to the recorded one, with their uncertainty.
 #pragma once
 
 #include <functional>
@@ -8,17 +8,19 @@
 
 namespace softarm {
 
+/// Settings of `refine`.
 struct RefinementOptions {
   int most_rounds = 40;
-  /// Standard deviation, in the parameters' scales, of what was believed before; 0: nothing was.
+  /// Standard deviation, in the parameters' scales, of the prior at the configured values; 0: no
+  /// prior.
   double prior = 0.0;
-  /// false: every component weighs alike, so that the RMS itself is least (without a prior).
+  /// false: all components have the same weight, so that the RMS is minimised (without a prior).
   bool weighted = true;
   int threads = 1;
   std::function<void(const std::string&)> progress;  ///< may be empty
 };
 
-/// Everything about x is in the scales of the set.
+/// The result of a fit. All quantities of x are in the scales of the set.
 struct Refinement {
   Eigen::VectorXd x;
   Eigen::MatrixXd covariance;                  ///< of x, with the residuals' correlation in time
@@ -27,13 +29,13 @@ struct Refinement {
   Eigen::MatrixXd measured_rad, residual_rad;  ///< a row a frame; measured minus simulated
   double rms_rad = 0.0;                        ///< of a component of the residual
   double motion_rms_rad = 0.0;                 ///< of a component of the motion about its mean
-  double inflation = 1.0;  ///< as many frames count as one, so correlated are the residuals
+  double inflation = 1.0;  ///< how many frames count as one, by the correlation of the residuals
 
-  /// Of the whitened sensitivities, largest first, and the combinations of x they belong to, in
-  /// columns: 1 over a singular value is the standard error of its combination.
+  /// Singular values of the whitened sensitivities, largest first, and the combinations of x that
+  /// they belong to, in columns: 1 over a singular value is the standard error of its combination.
   Eigen::VectorXd singular_values;
   Eigen::MatrixXd combinations;
-  int held = 0;  ///< the last so many combinations are not told by the data and stay as they were
+  int held = 0;  ///< how many of the last combinations the data do not determine; they are kept
 
   int rounds = 0;
   bool converged = false;
@@ -42,20 +44,22 @@ struct Refinement {
 };
 
 /// Minimises sum r' W r over frames, r = measured - simulated u, by Levenberg and Marquardt's
-/// method; W is the inverse of the residuals' own covariance over the components of a frame, found
-/// anew twice. Sensitivities are finite differences of the simulation. A combination of
-/// parameters whose standard error exceeds 1 (in their scales, hence 100 %) stays as it was. A
-/// parameter that would leave what is possible rests against its limit.
-/// The covariance is the sandwich (J'WJ)^-1 S (J'WJ)^-1, S that of the scores J'W r summed over
-/// time (see `sum_covariance`): it holds for noise that is filtered as for noise that is white.
-/// @throws std::runtime_error where no response can be simulated at `start`
+/// method; W is the inverse of the covariance of the residuals over the components of a frame,
+/// which is estimated again twice. Sensitivities are finite differences of the simulation. A
+/// combination of parameters whose standard error exceeds 1 (in their scales, that is 100 %) keeps
+/// its value. A parameter that would leave its possible range stays at its limit. The covariance of
+/// x is the sandwich (J'WJ)^-1 S (J'WJ)^-1, with S the covariance of the scores J'W r summed over
+/// time (see `sum_covariance`): it is valid for filtered and for white noise.
+/// @param start  in the scales of the set
+/// @throws std::runtime_error if no response can be simulated at `start`
 Refinement refine(const ParameterSet& set, const MotionRecord& record, const Eigen::VectorXd& start,
                   const RefinementOptions& options);
 
-/// The response without any fit, compared alike.
+/// The response at `x` without a fit, compared in the same way.
 Refinement predict(const ParameterSet& set, const MotionRecord& record, const Eigen::VectorXd& x);
 
-/// d u / d x of the frames compared, components of a frame below each other, by finite differences.
+/// d u / d x at the frames compared, by finite differences: one row per component of a frame, frame
+/// by frame; one column per parameter.
 Eigen::MatrixXd sensitivities(const ParameterSet& set, const MotionRecord& record,
                               const Eigen::VectorXd& x, int threads);
 

@@ -1,4 +1,4 @@
-// What a pre-flight check found: one line each, for a person, and as JSON.
+// Results of the pre-run checks: one line each for a person, and as JSON.
 #pragma once
 
 #include <span>
@@ -7,6 +7,7 @@
 
 namespace softarm {
 
+/// Result of a check.
 enum class Verdict { pass, fail, not_checked };
 
 /// One line of the report.
@@ -15,15 +16,16 @@ struct Finding {
   Verdict verdict = Verdict::not_checked;
   std::string text =
       {};  ///< what was measured, with units; what is wrong; or why it was not checked
-  std::string cure = {};  ///< of what failed
+  std::string cure = {};  ///< how to fix what failed
 };
 
-/// Any of them failed.
+/// Whether any of them failed.
 bool any_failed(std::span<const Finding> findings) noexcept;
-/// The finding of this check is there and failed.
+/// Whether there is a finding of this check, and it failed.
 bool failed(std::span<const Finding> findings, const std::string& check) noexcept;
 
-/// "pass  units  segments are ..." a line, then how many passed, failed and were not checked.
+/// One line per finding ("pass  units  segments are ..."), then how many passed, failed and were
+/// not checked.
 std::string report_text(std::span<const Finding> findings);
 /// {"findings": [{"check", "verdict", "text", "cure"}], "failed": N}
 std::string report_json(std::span<const Finding> findings);

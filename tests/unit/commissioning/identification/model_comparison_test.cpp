@@ -12,20 +12,20 @@
 namespace softarm {
 namespace {
 
-/// An arm that creeps: u' = (push - k b - c |b|^2 b) / beta, b = u - rest, behind a lag.
+/// An arm that creeps: u' = (input_map - k b - c |b|^2 b) / beta, b = u - rest, behind a lag.
 struct Creeper {
   double k = 1.0, beta = 0.5, cubic = 0.0, lag_s = 0.0;
   Eigen::Vector2d rest = Eigen::Vector2d::Zero();
-  Eigen::Matrix<double, 2, 4> push;
+  Eigen::Matrix<double, 2, 4> input_map;
 
   Creeper() {
     for (int j = 0; j < 4; ++j) {  // 35 degrees off where they are said to be
       const double angle = 0.6 + M_PI / 2 * j, gain = 0.2 + 0.03 * j;
-      push.col(j) << -gain * std::cos(angle), -gain * std::sin(angle);
+      input_map.col(j) << -gain * std::cos(angle), -gain * std::sin(angle);
     }
   }
 
-  /// Pressures of three incommensurate periods each, from 1 s on; `gain(t)` scales what they push.
+  /// Pressures of three incommensurate periods each, from 1 s on; `gain(t)` scales what they input_map.
   template <class Gain>
   MotionRecord record(double seconds, const Gain& gain) const {
     constexpr int kSteps = 50;  // of 1 ms, from frame to frame
@@ -54,7 +54,7 @@ struct Creeper {
         const Eigen::Vector4d next =
             lag_s > 0.0 ? Eigen::Vector4d(now + std::exp(-h / lag_s) * (behind - now)) : now;
         const Eigen::Vector2d force =
-            gain(out.time_s[i]) * push * (lag_s > 0.0 ? 0.5 * (behind + next) : now);
+            gain(out.time_s[i]) * input_map * (lag_s > 0.0 ? 0.5 * (behind + next) : now);
         const auto rate = [&](const Eigen::Vector2d& at) -> Eigen::Vector2d {
           const Eigen::Vector2d b = at - rest;
           return (force - k * b - cubic * b.squaredNorm() * b) / beta;
@@ -102,7 +102,7 @@ TEST(ModelComparison, FindsDirectionsRestLagAndCubicStiffness) {
   const ModelComparison found = compare_models(slow_arm(), record, choice, two_threads(), nullptr);
 
   // What was asked is the arm itself.
-  const ParameterSet set(believed(slow_arm()), ActuationKind::chambers, choice);
+  const ParameterSet set(configured(slow_arm()), ActuationKind::chambers, choice);
   const CrossValidation& asked = found.trials.back().result;
   EXPECT_TRUE(asked.converged);
   const ArmHypothesis arm = set.arm(asked.whole.x);
@@ -110,7 +110,7 @@ TEST(ModelComparison, FindsDirectionsRestLagAndCubicStiffness) {
   EXPECT_NEAR(arm.lag_s, truth.lag_s, 1e-3 * truth.lag_s);
   EXPECT_NEAR(arm.cubic_nm_per_rad3, truth.cubic, 1e-3 * truth.cubic);
   EXPECT_LT((arm.rest_rad - truth.rest).norm(), 1e-4);
-  EXPECT_LT((arm.push - truth.push).norm(), 1e-3 * truth.push.norm());
+  EXPECT_LT((arm.input_map - truth.input_map).norm(), 1e-3 * truth.input_map.norm());
   EXPECT_LT(asked.second_by_first_rad, 1e-5);
   EXPECT_LT(asked.first_by_second_rad, 1e-5);
 
@@ -135,7 +135,7 @@ TEST(ModelComparison, HalvesThatDifferAreTold) {
   // In the second half everything pushes twice as much; u is linear in what pushes.
   const Creeper truth;
   const MotionRecord record = truth.record(40.0, [](double t) { return t <= 20.0 ? 1.0 : 2.0; });
-  const ParameterSet set(believed(slow_arm()), ActuationKind::chambers, slow_choice());
+  const ParameterSet set(configured(slow_arm()), ActuationKind::chambers, slow_choice());
   const CrossValidation found = cross_validate(set, record, two_threads());
   const auto rms = [&](double from_s, double to_s) {
     const Eigen::MatrixXd part = record.part(from_s, to_s, 0.0).u_rad;
@@ -158,7 +158,7 @@ TEST(ModelComparison, ALagThatWouldBeNegativeRestsAtItsLimit) {
   record.input.time_s.array() += 0.1;  // u is ahead of what it is told to follow
   FitChoice choice = slow_choice();
   choice.lag = true;
-  const ParameterSet set(believed(slow_arm()), ActuationKind::chambers, choice);
+  const ParameterSet set(configured(slow_arm()), ActuationKind::chambers, choice);
   const Refinement fit = identify(set, record, two_threads());
   EXPECT_TRUE(fit.converged);
   // beta / k is a lag, too: one of the two rests at its limit.
@@ -178,9 +178,9 @@ TEST(ModelComparison, InertiaDoesNotCountInSlowMotion) {
   choice.inertia = true;
   Experiment experiment = slow_arm();
   experiment.arm.segments[0].damping_nms_per_rad = 0.06;
-  ArmHypothesis start = believed(experiment);
+  ArmHypothesis start = configured(experiment);
   const ParameterSet set(start, ActuationKind::chambers, choice);
-  start.push = truth.push;
+  start.input_map = truth.input_map;
   const Refinement fit = refine(set, record, set.of(start), two_threads().refinement);
   EXPECT_TRUE(fit.converged);
   EXPECT_NEAR(set.arm(fit.x).arm.segments[0].damping_nms_per_rad, truth.beta, 1e-2 * truth.beta);

@@ -25,7 +25,7 @@ TEST(Refinement, ExactDataOfThePlantGiveItsParameters) {
   const MotionRecord record = test::plant_record(experiment, 8, 0.2, 0.2, 2000.0);
   FitChoice choice;
   choice.delay = false;
-  const ParameterSet set(believed(experiment), ActuationKind::chambers, choice);
+  const ParameterSet set(configured(experiment), ActuationKind::chambers, choice);
   const Refinement fit = identify(set, record, {});
   EXPECT_TRUE(fit.converged);
   const Eigen::VectorXd truth = set.of(of_plant(experiment));
@@ -42,7 +42,7 @@ TEST(Refinement, SensitivitiesAreThoseOfThePlant) {
   choice.delay = false;
   choice.gains = GainSharing::arm;
   const ParameterSet set(start, ActuationKind::chambers, choice);
-  const Eigen::MatrixXd J = sensitivities(set, record, set.believed(), 2);
+  const Eigen::MatrixXd J = sensitivities(set, record, set.configured(), 2);
   for (Eigen::Index i = 0; i < set.size(); ++i) {
     const auto at = [&](double part) {
       Experiment moved = experiment;
@@ -106,7 +106,7 @@ TEST(Refinement, IntervalsAreThoseOfTheFisherInformation) {
   const ParameterSet set(of_plant(experiment), ActuationKind::chambers, choice);
   ASSERT_EQ(set.size(), 3);
   RefinementOptions options;
-  const Refinement fit = refine(set, record, set.believed(), options);
+  const Refinement fit = refine(set, record, set.configured(), options);
   EXPECT_TRUE(fit.converged);
   EXPECT_EQ(fit.held, 0);
   // The information in the sensitivities. The mass alone tells k from g, through a transient of a
@@ -132,7 +132,7 @@ TEST(Refinement, IntervalsHoldTheTruthWhereNoiseIsFiltered) {
   choice.gains = GainSharing::arm;
   choice.lag = choice.delay = false;
   const ParameterSet set(of_plant(experiment), ActuationKind::chambers, choice);
-  const Eigen::VectorXd truth = set.believed();
+  const Eigen::VectorXd truth = set.configured();
   constexpr int kSeeds = 60;
   Eigen::ArrayXi covered = Eigen::ArrayXi::Zero(set.size());
   Eigen::ArrayXi covered_as_if_white = covered;
@@ -160,12 +160,12 @@ TEST(Refinement, SaysWhatARecordDoesNotTell) {
   FitChoice choice;
   choice.lag = choice.delay = false;
   experiment.actuation.segments[0][3].gain_nm_per_bar = 0.5;
-  const ParameterSet set(believed(experiment), ActuationKind::chambers, choice);
+  const ParameterSet set(configured(experiment), ActuationKind::chambers, choice);
   const Refinement fit = identify(set, record, {});
   EXPECT_EQ(fit.held, 2);
   EXPECT_NEAR(fit.x[5], 1.0, 1e-6);  // chamber 4, as configured
   const std::string text = conditioning_text(set, fit);
-  EXPECT_NE(text.find("not told by this record"), std::string::npos) << text;
+  EXPECT_NE(text.find("not determined by this record"), std::string::npos) << text;
   EXPECT_NE(text.find("segment 1 chamber 4"), std::string::npos) << text;
 }
 
@@ -184,14 +184,14 @@ TEST(Refinement, WithoutGravitySlowMotionTellsRatiosOnly) {
   FitChoice choice;
   choice.lag = choice.delay = false;
   choice.gains = GainSharing::arm;
-  const ParameterSet set(believed(experiment), ActuationKind::chambers, choice);
+  const ParameterSet set(configured(experiment), ActuationKind::chambers, choice);
   const ResponseModel model(record);
-  const ArmHypothesis arm = set.arm(set.believed());
+  const ArmHypothesis arm = set.arm(set.configured());
   ASSERT_TRUE(model.simulate(arm, model.longest_step_s(arm), record.u_rad));
   test::add_noise(record, 2e-3, 0.0, 2);
-  const Refinement fit = refine(set, record, set.believed(), {});
+  const Refinement fit = refine(set, record, set.configured(), {});
   ASSERT_GE(fit.held, 1);
-  // All three by the same factor: what is told least.
+  // All three by the same factor: the least determined combination.
   EXPECT_GT(std::abs(fit.combinations.col(2).dot(Eigen::Vector3d::Ones().normalized())), 0.98);
 }
 
@@ -210,14 +210,14 @@ TEST(Refinement, AnArmBentFarIsSimulatedWithShorterSteps) {
   record.input.value.setZero(2, 4);
   record.input.value(1, 0) = 3.0;
   const ResponseModel model(record);
-  const ArmHypothesis truth = believed(experiment);
+  const ArmHypothesis truth = configured(experiment);
   const double longest_s = model.longest_step_s(truth);
   ASSERT_FALSE(model.simulate(truth, longest_s, record.u_rad));
   ASSERT_TRUE(model.simulate(truth, 0.25 * longest_s, record.u_rad));
 
   const ParameterSet set(truth, ActuationKind::chambers, choice);
   for (const Refinement& fit :
-       {refine(set, record, set.believed(), {}), predict(set, record, set.believed())}) {
+       {refine(set, record, set.configured(), {}), predict(set, record, set.configured())}) {
     ASSERT_EQ(fit.residual_rad.rows(), record.u_rad.rows());
     EXPECT_LT(fit.rms_rad, 0.2 * fit.motion_rms_rad);
   }
@@ -229,8 +229,22 @@ TEST(Refinement, RefusesWhatCannotBeSimulated) {
   experiment.arm.segments.assign(3, experiment.arm.segments[0]);
   experiment.arm.mass = MassModel::point;
   experiment.actuation.segments.assign(3, experiment.actuation.segments[0]);
-  const ArmHypothesis arm = believed(experiment);
+  const ArmHypothesis arm = configured(experiment);
   EXPECT_THROW(ResponseModel(record).longest_step_s(arm), std::runtime_error);
+}
+
+/// Without inertia the fastest mode is (k + G_u) / beta; the weight of an arm that stands out
+/// sideways, which is there without a bend, is no part of it.
+TEST(Refinement, TheStepOfAQuasiStaticArmIsThatOfItsStiffnessHoweverItIsMounted) {
+  Experiment experiment = one_segment();
+  const MotionRecord record = test::plant_record(experiment, 1, 0.2, 0.2, 200.0);
+  experiment.arm.base_rotation =
+      Eigen::AngleAxisd(M_PI / 2, Eigen::Vector3d::UnitY()).toRotationMatrix();
+  ArmHypothesis arm = configured(experiment);
+  arm.inertia = false;
+  const SegmentParameters& segment = experiment.arm.segments[0];
+  const double modes_s = segment.damping_nms_per_rad / segment.stiffness_nm_per_rad;
+  EXPECT_NEAR(ResponseModel(record).longest_step_s(arm), 2.0 * modes_s, 0.1 * modes_s);
 }
 
 }  // namespace

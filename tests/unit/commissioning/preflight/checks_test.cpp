@@ -1,5 +1,5 @@
 // Every finding of the pre-flight check, by the mistake it is for: made in what is seen, or in what
-// is believed.
+// is configured.
 #include <gtest/gtest.h>
 
 #include "unit/commissioning/preflight/observed.hpp"
@@ -74,9 +74,9 @@ TEST(Preflight, ABodyThatIsNeverSeenOrAtTimes) {
 TEST(Preflight, RateAndMissingFrames) {
   Experiment arm = hanging_arm(1);
   Observation seen = observed(arm);
-  Experiment believed = arm;
-  believed.safety.frame_period_s = 0.01;
-  EXPECT_TRUE(fails(checked(believed, seen), "rate", "frame_period_s: 0.005"));
+  Experiment configured = arm;
+  configured.safety.frame_period_s = 0.01;
+  EXPECT_TRUE(fails(checked(configured, seen), "rate", "frame_period_s: 0.005"));
   for (std::size_t k = seen.frames.size() - 1; k > 0; --k)
     if (k % 20 == 0) seen.frames.erase(seen.frames.begin() + static_cast<std::ptrdiff_t>(k));
   EXPECT_TRUE(fails(checked(arm, seen), "rate", "of the frames missing"));
@@ -86,19 +86,19 @@ TEST(Preflight, JitterThatTheDaemonWouldHoldFor) {
   const Experiment arm = hanging_arm(1);
   Observation seen = observed(arm);
   for (std::size_t k = 100; k < 110; ++k) seen.frames[k].arrival_ns = seen.frames[110].arrival_ns;
-  EXPECT_TRUE(fails(checked(arm, seen), "jitter", "their way varies by 50.0 ms"));
+  EXPECT_TRUE(fails(checked(arm, seen), "jitter", "with a jitter of 50.0 ms"));
   EXPECT_TRUE(alone(checked(arm, seen), "jitter"));
 }
 
 TEST(Preflight, LatencyIsToldOnlyWhereClocksAreOne) {
   const Experiment arm = hanging_arm(1);
   Observation seen = observed(arm);
-  Experiment believed = arm;
-  believed.safety.frame_latency_s = 0.02;
-  EXPECT_TRUE(fails(checked(believed, seen), "latency", "at least 5.0 ms by our wall clock"));
+  Experiment configured = arm;
+  configured.safety.frame_latency_s = 0.02;
+  EXPECT_TRUE(fails(checked(configured, seen), "latency", "at least 5.0 ms by our wall clock"));
   Observation elsewhere = seen;
   for (SeenFrame& frame : elsewhere.frames) frame.sender_us += 7'000'000;
-  EXPECT_EQ(finding(checked(believed, elsewhere), "latency").verdict, Verdict::not_checked);
+  EXPECT_EQ(finding(checked(configured, elsewhere), "latency").verdict, Verdict::not_checked);
   for (SeenFrame& frame : seen.frames) frame.sender_us = 0;
   EXPECT_TRUE(fails(checked(arm, seen), "latency", "do not advance"));
 }
@@ -146,9 +146,9 @@ TEST(Preflight, OrderAlongTheArm) {
 
 TEST(Preflight, LengthsOfSegments) {
   const Experiment arm = hanging_arm(3);
-  Experiment believed = arm;
-  believed.arm.segments[1].length_m = 0.13;
-  const std::vector<Finding> all = checked(believed, observed(arm));
+  Experiment configured = arm;
+  configured.arm.segments[1].length_m = 0.13;
+  const std::vector<Finding> all = checked(configured, observed(arm));
   EXPECT_TRUE(fails(all, "lengths", "segment 2 is 0.11"));
   EXPECT_TRUE(fails(all, "lengths", "arm.length_m: [0.11, 0.11, 0.11]"));
   EXPECT_TRUE(alone(all, "lengths"));
@@ -189,7 +189,7 @@ TEST(Preflight, OrderOfTheQuaternion) {
   Observation seen = observed(arm);
   for_each_body(seen, scalar_last);
   const std::vector<Finding> all = checked(arm, seen);
-  EXPECT_TRUE(fails(all, "quaternions", "taken for one another"));
+  EXPECT_TRUE(fails(all, "quaternions", "interchanged"));
   EXPECT_TRUE(fails(all, "quaternions", "daemon.mocap.quaternion: xyzw"));
   EXPECT_TRUE(alone(all, "quaternions"));
   EXPECT_EQ(obstacle_to_pulses(all), "quaternions");
@@ -254,25 +254,25 @@ TEST(Preflight, AMirroredWorldShowsInTheValveMap) {
 TEST(Preflight, ValveMap) {
   const Experiment arm = hanging_arm(2);
   const Observation right = observed(arm, true);
-  Experiment believed = arm;
-  auto& chambers = believed.actuation.segments;
+  Experiment configured = arm;
+  auto& chambers = configured.actuation.segments;
 
   std::swap(chambers[0][0].angle_rad, chambers[0][1].angle_rad);
-  EXPECT_TRUE(fails(checked(believed, right), "valve map",
+  EXPECT_TRUE(fails(checked(configured, right), "valve map",
                     "chamber 1 of segment 1 acts as chamber 2 of segment 1"));
   EXPECT_TRUE(
-      fails(checked(believed, right), "valve map", "valves.order: [1, 0, 2, 3, 4, 5, 6, 7]"));
-  EXPECT_TRUE(alone(checked(believed, right), "valve map"));
+      fails(checked(configured, right), "valve map", "valves.order: [1, 0, 2, 3, 4, 5, 6, 7]"));
+  EXPECT_TRUE(alone(checked(configured, right), "valve map"));
 
-  believed = arm;
+  configured = arm;
   for (auto& segment : chambers)
     for (Chamber& chamber : segment) chamber.angle_rad += M_PI;
-  EXPECT_TRUE(fails(checked(believed, right), "valve map", "bends away from a chamber"));
+  EXPECT_TRUE(fails(checked(configured, right), "valve map", "bends away from a chamber"));
 
-  believed = arm;
+  configured = arm;
   chambers[1][2].gain_nm_per_bar *= 3.0;
   EXPECT_TRUE(
-      fails(checked(believed, right), "valve map", "chamber 3 of segment 2 pushes with 0.3"));
+      fails(checked(configured, right), "valve map", "chamber 3 of segment 2 pushes with 0.3"));
 
   // Tubes of the two segments exchanged: the pulses went to the other one.
   Observation exchanged = right;
@@ -297,13 +297,13 @@ TEST(Preflight, PulsesThatEndedEarlyProveNothing) {
 
 TEST(Preflight, AChamberWithoutAirAndAnArmWithout) {
   Experiment arm = hanging_arm(2);
-  const Experiment believed = arm;
+  const Experiment configured = arm;
   arm.plant.actuation.segments[1][0].gain_nm_per_bar = 0.01;
-  EXPECT_TRUE(fails(checked(believed, observed(arm, true)), "valve map",
+  EXPECT_TRUE(fails(checked(configured, observed(arm, true)), "valve map",
                     "chamber 1 of segment 2 moves nothing"));
   for (auto& segment : arm.plant.actuation.segments)
     for (Chamber& chamber : segment) chamber.gain_nm_per_bar = 0.01;
-  EXPECT_TRUE(fails(checked(believed, observed(arm, true)), "valve map", "air supply"));
+  EXPECT_TRUE(fails(checked(configured, observed(arm, true)), "valve map", "air supply"));
 }
 
 TEST(Preflight, PressuresAndLeaks) {

@@ -1,0 +1,98 @@
+// The kinds of reference that are built in.
+// config/template.yaml documents every setting.
+#pragma once
+
+#include <Eigen/Core>
+#include <numbers>
+#include <string>
+#include <vector>
+
+#include "softarm/base/keys.hpp"
+#include "softarm/control/reference_kind.hpp"
+
+namespace softarm {
+
+/// Declares the keys of a curvature of every segment, `theta_rad` and `phi_rad` or `u_rad` (2n).
+void describe_pose(Keys& key, std::vector<double>& u_rad, Presence presence);
+
+/// Hold u constant.
+struct SetPointReference {
+  std::vector<double> u_rad;  ///< 2n
+
+  const char* name() const noexcept { return "set_point"; }
+  void describe(Keys& key);
+  void check(const ReferencePlace& place, const ControllerSettings& control, int segments) const;
+  double largest_theta_rad() const noexcept;
+  double largest_speed_radps() const noexcept { return 0.0; }
+  void evaluate(double time_s, ReferenceSample& out) const noexcept;
+};
+
+/// The paper's (24): theta rises to `theta_rad` in `rise_s`, phi_i = phi_centre + phi_amplitude
+/// cos(rate t + (i-1) phase). Known in polar coordinates too.
+struct PaperReference {
+  double theta_rad = 0.4;
+  double rise_s = 1.0;
+  double phi_centre_rad = std::numbers::pi;
+  double phi_amplitude_rad = 1.0;
+  double rate_radps = 2.0;
+  double phase_step_rad = 1.0471975511965976;
+
+  const char* name() const noexcept { return "paper"; }
+  void describe(Keys& key);
+  void check(const ReferencePlace& place, const ControllerSettings& control, int segments) const;
+  double largest_theta_rad() const noexcept { return theta_rad; }
+  double largest_speed_radps() const noexcept;
+  void evaluate(double time_s, ReferenceSample& out) const noexcept;
+};
+
+/// Where the arm is to be at a time of the phase.
+struct WayPoint {
+  double time_s = 0.0;
+  std::vector<double> u_rad;  ///< 2n
+};
+/// Smooth motion through way points: minimum-jerk (quintic) pieces, at rest in every point.
+struct WayPointReference {
+  std::vector<WayPoint> points;
+  bool repeat = false;
+
+  const char* name() const noexcept { return "way_points"; }
+  void describe(Keys& key);
+  void check(const ReferencePlace& place, const ControllerSettings& control, int segments) const;
+  double largest_theta_rad() const noexcept;
+  double largest_speed_radps() const noexcept;
+  void evaluate(double time_s, ReferenceSample& out) const noexcept;
+};
+
+/// References received over LCM; until one arrives, the arm holds where it is.
+struct LiveReference {
+  double timeout_s = 0.2;
+
+  const char* name() const noexcept { return "live"; }
+  void describe(Keys& key);
+  void check(const ReferencePlace& place, const ControllerSettings& control, int segments) const;
+};
+
+/// Path p_d(t) of the tip in the world.
+enum class TipPathShape {
+  point,      ///< p_d = centre
+  circle,     ///< p_d = centre + first_axis cos(rate t) + second_axis sin(rate t); an ellipse
+  lemniscate  ///< p_d = centre + first_axis cos(rate t) + second_axis sin(2 rate t)
+};
+
+/// Where the tip should be, in the world frame; the defaults are the paper's lemniscate (22).
+struct TipPathReference {
+  TipPathShape shape = TipPathShape::lemniscate;
+  Eigen::Vector3d centre_m = Eigen::Vector3d(-0.25, 0.0, -0.5);
+  Eigen::Vector3d first_axis_m = Eigen::Vector3d(0.0, 1.0 / 3.0, 0.0);
+  Eigen::Vector3d second_axis_m = Eigen::Vector3d(0.0, 0.0, 1.0 / 6.0);
+  double rate_radps = 0.6283185307179586;
+
+  const char* name() const noexcept;
+  void describe(Keys& key);
+  void check(const ReferencePlace& place, const ControllerSettings& control, int segments) const;
+  TipReference tip(double time_s) const noexcept;
+  /// How far the path goes from a point, at 720 instants of its period.
+  double largest_distance_m(const Eigen::Vector3d& from_m) const noexcept;
+};
+
+}  // namespace softarm

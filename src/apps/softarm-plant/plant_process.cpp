@@ -1,0 +1,155 @@
+#include "apps/softarm-plant/plant_process.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "apps/program.hpp"
+#include "apps/signals.hpp"
+#include "softarm/base/clock.hpp"
+#include "softarm/base/time.hpp"
+#include "softarm/transport/message_decoding.hpp"
+
+namespace softarm {
+namespace {
+
+constexpr int kCommandCapacity = 64;
+/// The longest stall that the arm catches up with. For the rest its time stands still: otherwise a
+/// machine that is too slow would fall further behind with every step.
+constexpr std::int64_t kMostBehind_ns = 250'000'000;
+
+}  // namespace
+
+PlantProcess::PlantProcess(const Experiment& experiment, std::optional<int> modbus_port)
+    : lcm_(experiment.transport.lcm),
+      mocap_(experiment.transport, experiment.plant.arm),
+      node_(lcm_.url),
+      // Registers hold until the terminal's own time-out, or without limit if it has none.
+      arm_(experiment.plant, monotonic_now_ns(),
+           modbus_port ? kForever : to_ns(experiment.safety.command_validity_s)),
+      by_torque_(experiment.plant.actuation.kind == ActuationKind::torque),
+      report_period_ns_(to_ns(1.0 / experiment.plant.mocap.rate_hz)) {
+  if (modbus_port) {
+    modbus_ = std::make_unique<ModbusSide>(experiment.valves, *modbus_port);
+    say(fmt::format("softarm-plant: valve terminal at 127.0.0.1 port {}\n",
+                    modbus_->server.port()));
+    return;
+  }
+  // No exception may pass through LCM, so the handler only takes the message; the loop acts on
+  // it.
+  node_.subscribe(lcm_.command_channel, kCommandCapacity, [this](const ReceivedMessage& packet) {
+    command_received_ =
+        by_torque_ ? decode(packet.bytes, torque_message_) : decode(packet.bytes, command_message_);
+  });
+}
+
+void PlantProcess::run() {
+  std::int64_t next_report_ns = arm_.time_ns();
+  while (stop_requested == 0) {
+    const std::int64_t deadline_ns = std::min(next_report_ns, arm_.next_event_ns()) + lost_ns_;
+    modbus_ ? serve_requests(deadline_ns) : take_commands(deadline_ns);
+    advance();
+    for (MocapFrame frame; arm_.receive(frame);) {
+      mocap_.publish(node_, frame, (frame.capture_ns + lost_ns_) / 1000);
+    }
+    if (arm_.time_ns() >= next_report_ns) {
+      publish_state();
+      next_report_ns = std::max(next_report_ns + report_period_ns_, arm_.time_ns());
+    }
+  }
+}
+
+void PlantProcess::take_commands(std::int64_t deadline_ns) {
+  if (!node_.wait_until(deadline_ns)) return;
+  // All messages that came meanwhile: a full queue would keep the oldest commands and drop the
+  // newest.
+  int taken = 0;
+  do {
+    if (std::exchange(command_received_, false)) take_command();
+  } while (++taken < kCommandCapacity && node_.drain(1) > 0);
+}
+
+/// Written set points hold until the terminal's time-out, counted from the last request.
+void PlantProcess::serve_requests(std::int64_t deadline_ns) {
+  if (!modbus_->server.wait_until(deadline_ns)) return;
+  advance();
+  SimulatedTerminal& terminal = modbus_->terminal;
+  terminal.measure(arm_.measured_pressures_bar());
+  modbus_->server.serve(terminal);
+  if (!terminal.take_served()) return;
+  const Eigen::VectorXd& bar = terminal.set_points_bar();
+  const double timeout_s = terminal.timeout_s();
+  arm_.command({.sequence = modbus_->sequence++,
+                .validity_ns = timeout_s > 0.0 ? to_ns(timeout_s) : kForever,
+                .pressure_bar = {bar.data(), static_cast<std::size_t>(bar.size())}},
+               arm_now_ns());
+}
+
+/// The arm's time: the monotonic clock minus the time lost in stalls.
+std::int64_t PlantProcess::arm_now_ns() {
+  const std::int64_t now_ns = monotonic_now_ns() - lost_ns_;
+  const std::int64_t excess_ns = now_ns - arm_.time_ns() - kMostBehind_ns;
+  if (excess_ns <= 0) return now_ns;
+  lost_ns_ += excess_ns;
+  say(fmt::format("softarm-plant: {:.3f} s behind real time; the arm stood still meanwhile\n",
+                  to_seconds(excess_ns)));
+  return now_ns - excess_ns;
+}
+
+void PlantProcess::advance() {
+  const bool was_vented = arm_.vented();
+  arm_.advance_to(arm_now_ns());
+  if (!arm_.vented() || was_vented) return;
+  say("softarm-plant: commands have stopped; vented\n");
+  if (modbus_) modbus_->terminal.reset_outputs();
+}
+
+void PlantProcess::take_command() {
+  by_torque_ ? take_command(torque_message_, torque_message_.torque_nm)
+             : take_command(command_message_, command_message_.pressure_bar);
+}
+
+template <class Message, class Values>
+void PlantProcess::take_command(const Message& message, const Values& values) {
+  pressure_bar_.assign(values.begin(), values.end());
+  const bool was_vented = arm_.vented();
+  const CommandVerdict verdict =
+      arm_.command({.sequence = message.sequence,
+                    .validity_ns = std::int64_t{message.validity_us} * 1000,
+                    .shadow = message.shadow != 0,
+                    .pressure_bar = pressure_bar_},
+                   arm_now_ns());
+  if (was_vented && verdict == CommandVerdict::in_force)
+    say("softarm-plant: commands have begun\n");
+}
+
+void PlantProcess::publish_state() {
+  const ArmPlant& plant = arm_.plant();
+  const Eigen::VectorXd& pressure = arm_.measured_pressures_bar();
+  measurement_message_.time_us = (arm_.time_ns() + lost_ns_) / 1000;
+  measurement_message_.sequence = arm_.sequence();
+  measurement_message_.num_chambers = static_cast<std::int16_t>(pressure.size());
+  measurement_message_.pressure_bar.assign(pressure.begin(), pressure.end());
+  if (!by_torque_ && !modbus_) node_.publish(lcm_.measurement_channel, measurement_message_);
+
+  const SegmentVector u = plant.u_rad();
+  const SegmentVector velocity = plant.velocity_radps();
+  state_message_.time_us = measurement_message_.time_us;
+  state_message_.vented = arm_.vented() ? 1 : 0;
+  state_message_.num_segments = static_cast<std::int16_t>(plant.segments());
+  state_message_.num_chambers = measurement_message_.num_chambers;
+  state_message_.u_rad.clear();
+  state_message_.velocity_radps.clear();
+  for (int i = 0; i < plant.segments(); ++i) {
+    state_message_.u_rad.push_back({u[2 * i], u[2 * i + 1]});
+    state_message_.velocity_radps.push_back({velocity[2 * i], velocity[2 * i + 1]});
+  }
+  state_message_.pressure_bar = measurement_message_.pressure_bar;
+  const Eigen::Vector3d tip = plant.tip_m();
+  for (int axis = 0; axis < 3; ++axis) state_message_.tip_m[axis] = tip[axis];
+  node_.publish(lcm_.plant_channel, state_message_);
+}
+
+}  // namespace softarm

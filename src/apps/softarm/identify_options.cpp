@@ -1,0 +1,111 @@
+#include "apps/softarm/identify_options.hpp"
+
+#include <map>
+
+#include "apps/program.hpp"
+
+namespace softarm {
+namespace {
+
+void add_source_options(CLI::App& command, IdentifyCommand& options) {
+  auto* log = command.add_option(
+      "--log", options.log,
+      "identify from this LCM log (softarm import, lcm-logger) instead of steps");
+  command
+      .add_flag("--live", options.live,
+                "play the steps over LCM on the running plant or hardware, within the limits of "
+                "the section identification; Ctrl-C vents")
+      ->excludes(log);
+  const std::map<std::string, LoggedInput> inputs = {{"commanded", LoggedInput::commanded},
+                                                     {"measured", LoggedInput::measured}};
+  command.add_option("--input", options.input, "pressures of the log: commanded or measured")
+      ->transform(CLI::CheckedTransformer(inputs));
+  command.add_option("--from", options.from_s, "begin in the log, s after its first frame");
+  command.add_option("--to", options.to_s, "end in the log (default: its end)");
+  command.add_option("--skip", options.skip_s, "simulate so many s before comparing");
+  command.add_option("--apart", options.apart_s, "take frames of the log at least so many s apart")
+      ->check(number_between(0.0, 10.0));
+  command
+      .add_option("--bend", options.plan.bend_rad,
+                  "with actuation by torque: largest step, as the bend in rad that the "
+                  "configured stiffness would allow")
+      ->check(number_between(0.01, 3.0))
+      ->capture_default_str();
+}
+
+void add_choice_options(CLI::App& command, IdentifyCommand& options) {
+  command.add_flag("--per-segment", options.choice.per_segment,
+                   "k and beta of every segment instead of one for all");
+  const std::map<std::string, GainSharing> sharing = {{"arm", GainSharing::arm},
+                                                      {"side", GainSharing::side},
+                                                      {"segment", GainSharing::segment},
+                                                      {"chamber", GainSharing::chamber}};
+  command
+      .add_option("--gains", options.choice.gains,
+                  "separate gains for each: arm, side, segment or (default) chamber")
+      ->transform(CLI::CheckedTransformer(sharing));
+  command.add_flag("--no-stiffness", options.no_stiffness,
+                   "k as configured: for slow motion, which determines ratios only");
+  command.add_flag("--no-damping", options.no_damping, "beta as configured");
+  command.add_flag("--no-inertia", options.no_inertia,
+                   "leave inertia out, for motions so slow that it does not count: much quicker "
+                   "where beta is large");
+  command.add_flag("--no-lag", options.no_lag, "the lag is identification.lag_s");
+  command.add_flag("--no-delay", options.no_delay, "the delay is identification.delay_s");
+  command.add_flag("--rest", options.choice.rest, "fit the rest shape of the springs");
+  command.add_flag("--cubic", options.choice.cubic, "fit a cubic stiffness");
+  command.add_flag("--directions", options.choice.directions,
+                   "fit the direction in which every chamber bends its segment");
+  command
+      .add_option("--prior", options.options.refinement.prior,
+                  "how far, in parts of it, every number may be off what is configured (one "
+                  "standard deviation); 0: nothing is known before")
+      ->check(number_between(0.0, 1e6))
+      ->capture_default_str();
+}
+
+}  // namespace
+
+void add_identify_options(CLI::App& command, IdentifyCommand& options) {
+  command.add_option("CONFIG", options.config, "experiment in YAML")->required();
+  command.add_option("--output", options.output,
+                     "write an experiment that includes CONFIG and has the values found");
+  command.add_option("--out", options.out, "folder for what plots need");
+  add_source_options(command, options);
+  add_choice_options(command, options);
+  command.add_flag("--linear", options.linear,
+                   "linear least squares alone: quick, biased by noise and smoothing");
+  command.add_flag("--predict", options.predict,
+                   "identify nothing, but print how well CONFIG predicts the motion");
+  command.add_flag("--compare", options.compare,
+                   "what each further term gains, on the whole record and from half to half");
+  command.add_option("--hold", options.plan.hold_s, "time between steps in s")
+      ->check(number_between(0.1, 100.0));
+  command
+      .add_option("--longest-lag", options.options.longest_lag_s,
+                  "longest lag in s that the start of the search considers")
+      ->check(number_between(0.0, 100.0))
+      ->capture_default_str();
+  command
+      .add_option("--window", options.options.window_s,
+                  "width in s of the window that smooths for the start")
+      ->check(number_between(0.005, 10.0))
+      ->capture_default_str();
+  command
+      .add_option("--seed", options.seed,
+                  "seed of noise and dropouts (default: the configuration's)")
+      ->check(CLI::NonNegativeNumber);
+  command
+      .add_option("--seeds", options.study.seeds,
+                  "do it on so many arms drawn at random, and print how often the "
+                  "intervals hold the truth")
+      ->check(CLI::Range(1, 100000))
+      ->excludes("--live");
+  command
+      .add_option("--spread", options.study.spread,
+                  "with --seeds: how far the truth is off the configured, at most")
+      ->check(number_between(0.0, 0.9))
+      ->capture_default_str();
+}
+
+}  // namespace softarm

@@ -1,0 +1,42 @@
+// The keys of an experiment, declared once each (keys.hpp), in the order in which they are
+// printed.
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "softarm/config/config_keys.hpp"
+#include "softarm/config/experiment.hpp"
+
+namespace softarm {
+
+/// Declares a key with the name of the member of `it` that it sets.
+#define KEY(member, ...) key(#member, it.member, __VA_ARGS__)
+
+inline constexpr double kTwoPi = 6.283185307179586;
+inline constexpr double kMany = 1e6;
+inline constexpr auto kRequired = Presence::required;
+
+void describe(Keys& key, Experiment& it);
+
+// Its parts, in separate files.
+void describe_daemon(Keys& key, Experiment& it);
+void describe(Keys& key, ValveDriverSettings& it);
+void describe_reference(Keys& key, ReferenceSettings& it);
+/// The simulated arm starts from the values of the controller's keys.
+void describe_plant(Keys& key, Experiment& experiment);
+/// Without required keys where the variables hold values of other sections.
+void describe_arm(Keys& key, ArmParameters& it, Presence presence);
+void describe_actuation(Keys& key, ActuationSettings& it, Presence presence);
+
+/// A channel of section lcm, with its minimum length in characters.
+struct ChannelKey {
+  const char* name;
+  std::string LcmSettings::*channel;
+  int fewest;
+  const char* doc;
+};
+extern const std::array<ChannelKey, 11> kChannelKeys;
+
+}  // namespace softarm

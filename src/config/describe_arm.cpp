@@ -1,0 +1,202 @@
+// The keys of the arm and its chambers, of sensing and control, and the experiment as a whole.
+#include <numeric>
+
+#include "config/describe.hpp"
+
+namespace softarm {
+
+void describe_arm(Keys& key, ArmParameters& it, Presence presence) {
+  const auto each = [&](const char* name, double SegmentParameters::*member, const Form& range,
+                        const char* doc, Presence needed) {
+    std::vector<double> values;
+    for (const auto& segment : it.segments) values.push_back(segment.*member);
+    key(name, values, range.one_or_each(), doc, needed);
+    for (std::size_t i = 0; i < values.size(); ++i) it.segments[i].*member = values[i];
+  };
+  using Segment = SegmentParameters;
+  each("length_m", &Segment::length_m, above(0, 10), "of all segments, or a list", presence);
+  each("mass_kg", &Segment::mass_kg, above(0, 100), "of all segments, or a list", presence);
+  each("stiffness_nm_per_rad", &Segment::stiffness_nm_per_rad, from(0, 1e4),
+       "bending stiffness k of (14)", presence);
+  each("damping_nms_per_rad", &Segment::damping_nms_per_rad, from(0, 1e3),
+       "bending damping beta of (14)", presence);
+  each("radius_m", &Segment::radius_m, from(0, 1),
+       "of the round cross-section, for its rotary inertia; 0: left out, as in the paper",
+       Presence::optional);
+  key("mass_model", it.mass, one_of({"point", "distributed"}),
+      "point: the paper's masses at the centres of mass; distributed: along the arc");
+  key("actuation_model", it.actuation, one_of({"chamber", "couple"}),
+      "chamber: body-following moments of chambers and tendons; couple: the paper's (15)");
+  key.section({"base", "where the arm is mounted"}, [&] {
+    key("position_m", it.base_position_m, from(-1e3, 1e3), "origin of frame S_0 in the world");
+    key("rotation", it.base_rotation, base_rotation(),
+        "of S_0 in the world, whose +z the straight arm points along: hanging diag(1, -1, -1), "
+        "standing (identity), or a 3 x 3 matrix");
+  });
+  KEY(gravity_mps2, from(-100, 100), "in the world frame");
+}
+
+static void describe_chambers(Keys& key, std::vector<Chamber>& it, Presence presence) {
+  std::vector<double> angles, gains;
+  for (const Chamber& chamber : it) {
+    angles.push_back(chamber.angle_rad);
+    gains.push_back(chamber.gain_nm_per_bar);
+  }
+  key("angle_rad", angles, from(-kTwoPi, kTwoPi).list(),
+      "direction chi of every chamber about the segment's axis", presence);
+  gains.resize(angles.size(), gains.empty() ? 0.0 : gains.front());
+  key("gain_nm_per_bar", gains, above(0, kMany).one_or_each(),
+      "bending moment a bar, of all or of every chamber", presence);
+  it.resize(angles.size());
+  for (std::size_t j = 0; j < angles.size(); ++j) it[j] = {angles[j], gains[j]};
+}
+
+/// What is named `_bar` counts N m.
+static void describe_torque(Keys& key, ActuationSettings& it, bool chosen_before) {
+  if (!chosen_before) {
+    set_torque_actuation(it, key.segments, 100.0);
+    it.slew_bar_per_s = 1e6;
+    it.vent_bar_per_s = 200.0;
+  }
+  key("max_torque_nm", it.max_pressure_bar, above(0, 1e4), "about each axis of a segment");
+  it.min_pressure_bar = -it.max_pressure_bar;
+  key("slew_nm_per_s", it.slew_bar_per_s, above(0, 1e9), "largest rate of a commanded moment");
+  key("vent_nm_per_s", it.vent_bar_per_s, above(0, 1e9), "rate of the ramp to zero, below 1 s");
+}
+
+void describe_actuation(Keys& key, ActuationSettings& it, Presence presence) {
+  const bool torque_before = it.kind == ActuationKind::torque;
+  KEY(kind, one_of({"chambers", "torque"}),
+      "chambers: pressures; torque: tau_A itself, for simulated arms only, and all its keys are "
+      "then max_torque_nm (left out: 100), slew_nm_per_s (1e6) and vent_nm_per_s (200)");
+  const bool torque = it.kind == ActuationKind::torque;
+  key.when(!torque, [&] {
+    it.segments.resize(static_cast<std::size_t>(key.segments));
+    key.one_or_each({"chambers", "of all segments, or a list of every segment's", presence},
+                    it.segments, [&](auto& c) { describe_chambers(key, c, presence); });
+    KEY(min_pressure_bar, from(0, 100), "lowest commanded pressure");
+    KEY(max_pressure_bar, above(0, 100), "highest commanded pressure");
+    KEY(bias_pressure_bar, from(0, 100), "where pressures rest that no torque asks to move");
+    KEY(slew_bar_per_s, above(0, kMany), "largest rate of a commanded pressure");
+    KEY(vent_bar_per_s, above(0, kMany), "rate of the ramp to zero, which takes less than 1 s");
+    KEY(plane_rad, from(-kTwoPi, kTwoPi), "phi of the plane of a planar arm; left out: none");
+  });
+  key.when(torque, [&] { describe_torque(key, it, torque_before); });
+}
+
+static void describe(Keys& key, ModelObserverSettings& it) {
+  KEY(learn_parameters, "stiffness, damping, gain and a horizontal load of every segment, on line");
+  KEY(parameter_deviation, above(0, 1),
+      "standard deviation of the parameters before anything was learnt, relative");
+  KEY(parameter_drift_per_sqrt_s, from(0, 1), "random walk of the parameters, relative");
+  KEY(disturbance_drift_per_sqrt_s, above(0, 10),
+      "random walk of the disturbance over the torque that bends a segment by 1 rad, at least");
+  KEY(largest_disturbance_drift_per_sqrt_s, above(0, 10),
+      "the same, at most: it grows while the disturbance is seen to move");
+}
+
+static void describe(Keys& key, EstimationSettings& it) {
+  KEY(method, one_of({"pose", "orientation", "printed"}),
+      "pose: position and orientation; orientation: inertial sensors; printed: the paper's (20), "
+      "for comparison only");
+  KEY(position_noise_m, above(0, 1), "standard deviation an axis of every measured body");
+  KEY(orientation_noise_rad, above(0, 1), "the same, of its rotation vector");
+  KEY(filter_bandwidth_radps, above(0, 1e5), "of the velocity filter on u");
+  KEY(predicted_frames, from(0, 1000), "frames an occluded segment may be predicted for");
+  KEY(observer, one_of({"kinematic", "model"}),
+      "of u and u': kinematic (a filter on u alone) or model (a Kalman filter on (16), with a "
+      "disturbance and parameters)");
+  KEY(model_observer, "of observer: model");
+  KEY(quaternion_tolerance, above(0, 1), "a frame with ||q| - 1| above it is rejected");
+  KEY(length_tolerance, above(0, 100), "a frame with ||t| - chord| / L above it is rejected");
+  KEY(max_speed_radps, above(0, kMany), "a frame in which u jumps faster is rejected");
+}
+
+static void describe(Keys& key, ControlTerms& it) {
+  KEY(inertia, "B u''_ref");
+  KEY(coriolis, "C(u, u') u'_ref");
+  KEY(gravity, "G");
+  KEY(stiffness, "K u_ref");
+  KEY(damping, "D u'_ref");
+}
+
+static void describe(Keys& key, TaskSpaceSettings& it) {
+  KEY(lambda_1ps, above(0, 1e3), "both poles of the tip's error are at -lambda");
+  KEY(tip_bandwidth_radps, above(0, 1e4), "of the filter on measured tip minus reference");
+  KEY(posture_rate_1ps, from(0, 100), "of drifting to less bend where the tip does not move");
+}
+
+static void describe(Keys& key, ControllerSettings& it) {
+  for (auto* gains : {&it.kp, &it.kd, &it.ki})
+    gains->resize(static_cast<std::size_t>(2 * key.segments), 0.0);
+  const Form gains = from(0, 1e4).one_or_pairs();
+  KEY(coordinates, one_of({"u", "polar"}), "of (17): u (smooth everywhere) or polar (the paper's)");
+  KEY(terms, "of (17); one that is left out costs nothing");
+  key("kp_nm_per_rad", it.kp, gains,
+      "K_P: one for all, one a segment, or [x, y] a segment (polar: [phi, theta])", kRequired);
+  key("kd_nms_per_rad", it.kd, from(0, 1e3).one_or_pairs(), "K_D, in the same forms");
+  key("ki_nm_per_rad_s", it.ki, gains, "integral gain on u, in the same forms; not in the paper");
+  KEY(disturbance, one_of({"cancel", "model_only", "none"}),
+      "what the model observer found: cancel (parameters and disturbance), model_only (parameters; "
+      "the arm stays soft), none");
+  KEY(valve_lag_s, from(0, 5), "first-order lag inverted on what depends on the reference alone");
+  key("delay_s", it.dead_time_s, from(0, 5),
+      "dead time of valves and tubes, for the check of gains at load time");
+  KEY(max_theta_rad, above(0, kTwoPi), "soft limit on theta of reference and arm");
+  KEY(max_speed_radps, above(0, 1e4), "soft limit on |u'| of reference and arm, a segment");
+  KEY(max_step_rad, above(0, kTwoPi), "a larger jump of a live reference is refused");
+  KEY(blend_s, above(0, 1e3), "time in which a reference is joined from wherever the arm is");
+  KEY(polar_theta_min_rad, above(0, 1), "bounds A^-1 and the phi error near theta = 0, if polar");
+  KEY(task_space, "references of the tip, by (21)");
+}
+
+static void describe(Keys& key, RunSettings& it) {
+  KEY(duration_s, above(0, kMany), "of `softarm run` and the demo, where none is asked for");
+  KEY(tracking_from_s, from(0, kMany), "after ACTIVE; tracking errors count from here on");
+  KEY(log_rate_hz, from(0, 1e4), "rows of log.csv, from which errors are taken; 0: every tick");
+}
+
+static void describe_identification(Keys& key, IdentificationSettings& it, MotionLimits& limits) {
+  it.rest_u_rad.resize(static_cast<std::size_t>(2 * key.segments), 0.0);
+  KEY(steps_bar, above(0, 100).list(), "pressures of the steps, on every side in turn");
+  KEY(hold_s, from(0.1, 100), "from step to step");
+  key("max_theta_rad", limits.max_theta_rad, above(0, kTwoPi),
+      "a segment that bends farther ends the experiment");
+  key("max_speed_radps", limits.max_speed_radps, above(0, 1e4),
+      "a segment that moves faster ends the experiment");
+  KEY(rest_u_rad, from(-kTwoPi, kTwoPi).one_or_pairs(),
+      "where the springs rest, to predict a recorded motion; the controller does not know it");
+  KEY(cubic_nm_per_rad3, from(-1e4, 1e4), "likewise: adds c |u - rest|^2 (u - rest) to K u");
+  KEY(lag_s, from(0, 100), "first order, from set point to pressure, likewise");
+  key("delay_s", it.dead_time_s, from(-1, 100), "from set point to frame, likewise");
+}
+
+void describe(Keys& key, Experiment& it) {
+  KEY(name, from(1, 100), "of the experiment, for logs and plots", kRequired);
+  KEY(seed, from(0, 9007199254740992.0), "of every random number of the simulated arm");
+  key.section({"arm", "the arm as the controller models it", kRequired}, [&] {
+    key.segments = std::max(1, it.arm.size());
+    key("segments", key.segments, from(1, kMaxSegments), "how many", kRequired);
+    it.arm.segments.resize(static_cast<std::size_t>(key.segments));
+    describe_arm(key, it.arm, kRequired);
+  });
+  key.section({"actuation", "chambers and the limits of their valves", kRequired},
+              [&] { describe_actuation(key, it.actuation, kRequired); });
+  KEY(estimation, "from motion-capture frames to u");
+  key.section({"control", "the controller (17)", kRequired}, [&] { describe(key, it.control); });
+  describe_reference(key, it.reference);
+  key.section({"daemon", "rate, safety and connections of softarmd"},
+              [&] { describe_daemon(key, it); });
+  if (it.valves.order.empty()) {
+    it.valves.order.resize(static_cast<std::size_t>(chamber_count(it.actuation)));
+    std::iota(it.valves.order.begin(), it.valves.order.end(), 0);
+  }
+  KEY(valves, "the valve terminal that softarm-valves drives");
+  key.section({"plant", "the simulated arm; left out: the arm as the controller models it"},
+              [&] { describe_plant(key, it); });
+  KEY(run, "defaults of a simulated run");
+  key.section({"identification", "the steps and the findings of `softarm identify`"},
+              [&] { describe_identification(key, it.identification, it.motion_limits); });
+}
+
+}  // namespace softarm

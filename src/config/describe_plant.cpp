@@ -1,0 +1,134 @@
+// The declarations of the simulated arm.
+#include "config/describe.hpp"
+
+namespace softarm {
+
+/// Factors on the controller's model, applied before absolute values override it.
+static void describe_mismatch(Keys& key, PlantSettings& it) {
+  const auto factor = [&](const char* name, const char* doc, const auto& apply) {
+    std::vector<double> values(it.arm.segments.size(), 1.0);
+    key(name, values, above(0, 100).one_or_each(), doc);
+    for (std::size_t i = 0; i < values.size(); ++i) apply(i, values[i]);
+  };
+  auto& segments = it.arm.segments;
+  factor("stiffness_factor", "of all segments, or a list",
+         [&](std::size_t i, double f) { segments[i].stiffness_nm_per_rad *= f; });
+  factor("damping_factor", "the same",
+         [&](std::size_t i, double f) { segments[i].damping_nms_per_rad *= f; });
+  factor("mass_factor", "the same", [&](std::size_t i, double f) { segments[i].mass_kg *= f; });
+  factor("gain_factor", "of the chambers of all segments, or a list", [&](std::size_t i, double f) {
+    for (Chamber& chamber : it.actuation.segments[i]) chamber.gain_nm_per_bar *= f;
+  });
+}
+
+static void describe(Keys& key, MocapSettings& it) {
+  KEY(rate_hz, above(0, 1e4), "frames a second");
+  KEY(latency_s, from(0, 1), "from capture to arrival");
+  KEY(position_noise_m, from(0, 1), "standard deviation an axis of every body");
+  KEY(orientation_noise_rad, from(0, 1), "the same, of its rotation vector");
+  KEY(position_resolution_m, from(0, 1), "positions are rounded to its multiples; 0: exact");
+  KEY(dropout_probability, from(0, 1), "of a whole frame, independent from frame to frame");
+  KEY(noise_on_base, "the base is measured with noise too");
+}
+
+static void describe(Keys& key, ValveSettings& it) {
+  KEY(lag_s, from(0, 10), "time constant; 0: the command is the pressure");
+  KEY(supply_pressure_bar, above(0, 1e4), "highest; left out: actuation.max_pressure_bar");
+  KEY(dead_time_s, from(0, 10), "from a command's arrival until the valves begin to act");
+  KEY(slew_bar_per_s, from(0, 1e9), "largest rate of a real pressure; 0: no limit");
+  KEY(resolution_bar, from(0, 100), "set points are rounded to its multiples; 0: exact");
+}
+
+static void describe(Keys& key, ExternalLoad& it) {
+  KEY(segment, from(0, kMaxSegments), "it acts on the end of this segment; 0: the tip");
+  KEY(force_n, from(-1e6, 1e6), "world frame");
+  KEY(moment_nm, from(-1e6, 1e6), "world frame");
+  KEY(shape, one_of({"constant", "half_sine"}),
+      "constant, or a blow: half a sine over the duration");
+  KEY(start_s, from(0, kMany), "when it begins");
+  KEY(duration_s, from(0, kMany), "0: unlimited (a constant load only)");
+}
+
+static void describe(Keys& key, BaseMotion& it) {
+  KEY(amplitude_m, from(-10, 10), "world frame");
+  KEY(frequency_hz, from(0, 1000), "of the sine");
+  KEY(phase_rad, from(-100, 100), "at t = 0");
+}
+
+/// The section of every kind, whichever is chosen.
+static void describe_kind(Keys& key, PlantKind& chosen) {
+  const auto names = plant_kinds().names();
+  std::size_t index = plant_kinds().index(chosen.name());
+  key("kind", index, one_of(names),
+      "pcc: the model; refined: several constant-curvature pieces a segment; links: rigid links, "
+      "the paper's section VI");
+  if (key.reading()) chosen = plant_kinds().all()[index];
+  for (PlantKind kind : plant_kinds().all()) {
+    if (!kind.has_keys()) continue;
+    const bool it_is = std::string_view(kind.name()) == chosen.name();
+    key.section({kind.name(), "for the kind of this name"},
+                [&] { (it_is ? chosen : kind).describe(key); });
+  }
+}
+
+/// What the world does to the arm.
+static void describe_world(Keys& key, PlantSettings& it) {
+  KEY(tip_force_n, from(-1e4, 1e4), "constant external force at the tip, world frame");
+  if (key.reading() || !it.loads.empty()) {
+    key.list({"loads", "external forces and moments on the segments' ends; none if left out"},
+             it.loads, [&](ExternalLoad& load) { describe(key, load); });
+  }
+  it.payload_kg.resize(it.arm.segments.size(), 0.0);
+  KEY(payload_kg, from(0, 100).one_or_each(), "masses on the segments' ends, of all or a list");
+  KEY(base_motion, "the base moves along a sine, without turning");
+}
+
+static void describe_integrator(Keys& key, PlantSettings& it) {
+  key("integrator", it.method, one_of({"sdirk2", "cash4", "sdirk4", "erk", "cvode_bdf"}),
+      "method of SUNDIALS: one-step and implicit (sdirk2, cash4, sdirk4) or explicit (erk), "
+      "multistep (cvode_bdf)");
+  if (key.reading() && it.method != IntegratorMethod::sdirk2) {
+    // Another method is chosen for its accuracy.
+    it.relative_tolerance = 1e-6;
+    it.absolute_tolerance = 1e-8;
+    it.max_step_s = 0.0;
+  }
+  KEY(relative_tolerance, from(1e-13, 1e-2),
+      "of the integrator; left out: 1e-3, or 1e-6 where it is not sdirk2");
+  KEY(absolute_tolerance, from(1e-15, 1e-2),
+      "of the integrator, for u; 1000 times that for u' in rad/s; left out: 1e-4, or 1e-8 where it "
+      "is not sdirk2");
+  KEY(max_step_s, from(0, 1),
+      "longest step, 0: as the tolerances allow; left out: 1 ms, or 0 where the integrator is not "
+      "sdirk2");
+}
+
+void describe_plant(Keys& key, Experiment& experiment) {
+  PlantSettings& it = experiment.plant;
+  if (key.reading()) {
+    it.arm = experiment.arm;
+    it.actuation = experiment.actuation;
+    it.valves.supply_pressure_bar = experiment.actuation.max_pressure_bar;
+    it.seed = experiment.seed;
+  }
+  describe_kind(key, it.kind);
+  constexpr auto kOptional = Presence::optional;
+  key.section({"mismatch", "factors on the controller's model", kOptional, SectionKind::input_only},
+              [&] { describe_mismatch(key, it); });
+  key.section(
+      {"arm", "keys of `arm` that differ here (not segments)", kOptional, SectionKind::hint},
+      [&] { describe_arm(key, it.arm, kOptional); });
+  key.section({"actuation", "keys of `actuation` that differ here", kOptional, SectionKind::hint},
+              [&] { describe_actuation(key, it.actuation, kOptional); });
+  KEY(valves, "between commanded and real pressure (or torque, then in N m)");
+  KEY(mocap, "simulated motion capture");
+  key.section({"initial", "where the arm starts, at rest"}, [&] {
+    std::vector<double> u(it.initial_u_rad.begin(), it.initial_u_rad.end());
+    describe_pose(key, u, kOptional);
+    it.initial_u_rad = Eigen::Map<const Eigen::VectorXd>(u.data(), 2 * key.segments);
+  });
+  describe_world(key, it);
+  describe_integrator(key, it);
+}
+
+}  // namespace softarm

@@ -1,0 +1,141 @@
+#include "softarm/estimation/model_observer.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "estimation/observer_state.hpp"
+#include "softarm/base/time.hpp"
+
+namespace softarm {
+namespace {
+
+/// Silence after which what was known of the motion is worth nothing.
+constexpr double kResetGap_s = 1.0;
+
+}  // namespace
+
+ModelObserver::ModelObserver(const ArmParameters& arm, const EstimationSettings& settings,
+                             std::span<const BodyNoise> noise, const ObserverTiming& timing)
+    : state_(std::make_unique<State>(arm, settings, noise, timing)) {}
+ModelObserver::~ModelObserver() = default;
+ModelObserver::ModelObserver(ModelObserver&&) noexcept = default;
+ModelObserver& ModelObserver::operator=(ModelObserver&&) noexcept = default;
+
+void ModelObserver::command(std::int64_t now_ns, ConstVectorRef tau_actuation_nm) noexcept {
+  state_->history.command(now_ns + state_->delay_ns, tau_actuation_nm);
+}
+
+void ModelObserver::vented() noexcept {
+  state_->history.clear();
+  state_->running = false;
+}
+
+void ModelObserver::reset() noexcept {
+  state_->running = false;
+  state_->base_average.reset();
+}
+
+void ModelObserver::update(const MocapFrame& frame, const CurvatureEstimate& estimate,
+                           const KnownMotion* reference, bool learn) noexcept {
+  State& s = *state_;
+  const int n = s.arm.size();
+  if (estimate.segments != n || frame.segments != n) return;
+  if (s.newest_ns != 0 && frame.capture_ns <= s.newest_ns) return;
+  const double since_s =
+      s.newest_ns == 0 ? 0.0 : std::min(kResetGap_s, to_seconds(frame.capture_ns - s.newest_ns));
+  if (since_s >= kResetGap_s) s.running = false;
+  s.newest_ns = frame.capture_ns;
+  s.measure(frame, estimate, since_s);
+  if (!s.running) {
+    if (std::all_of(s.seen.begin(), s.seen.begin() + n, [](bool each) { return each; }))
+      s.start(frame.capture_ns);
+    return;
+  }
+  const bool usable = reference != nullptr && reference->u_rad.size() == 2 * n &&
+                      reference->velocity_radps.size() == 2 * n &&
+                      reference->acceleration_radps2.size() == 2 * n;
+  s.learns = s.settings.learn_parameters && usable && learn && !s.monitor.jump();
+  s.ahead_is_stale = true;
+  if (!s.advance_base(frame.capture_ns, usable ? reference : nullptr) || !s.correct(since_s))
+    s.fail();
+}
+
+void ModelObserver::predict(std::int64_t now_ns, std::int64_t act_ns,
+                            FilteredMotion& out) noexcept {
+  State& s = *state_;
+  const std::int64_t known_ns = now_ns + s.delay_ns, time_ns = act_ns + s.delay_ns;
+  const int n = s.arm.size();
+  out.segments = n;
+  out.u_rad.setZero(2 * n);
+  out.velocity_radps.setZero(2 * n);
+  out.valid.fill(false);
+  if (!s.running) return;
+  // No frame will show what is older than this; so the way ahead stays short, however long the
+  // silence.
+  if (!s.advance_base(now_ns - s.max_latency_ns, nullptr)) return s.fail();
+  if (s.ahead_is_stale) {
+    s.ahead = s.base;
+    s.predictor.linearize(s.base.u, s.correction);
+    s.ahead_is_stale = false;
+  }
+  Motion& at = s.ahead;
+  if (!s.advance_motion(known_ns, at)) return s.fail();
+  out.u_rad = at.u;
+  out.velocity_radps = at.velocity;
+  // The rest of the way the next command is not known yet.
+  if (time_ns > at.torque.time_ns) {
+    Motion& last = s.last;
+    last = at;
+    if (!s.advance_motion(time_ns, last)) return s.fail();
+    out.u_rad = last.u;
+    out.velocity_radps = last.velocity;
+  }
+  for (int i = 0; i < n; ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    out.valid[k] = s.unseen_frames[k] <= s.predicted_frames;
+  }
+}
+
+bool ModelObserver::running() const noexcept { return state_->running; }
+std::int64_t ModelObserver::failures() const noexcept { return state_->failures; }
+const ModelCorrection& ModelObserver::correction() const noexcept { return state_->correction; }
+double ModelObserver::nis() const noexcept { return state_->nis; }
+bool ModelObserver::surprised() const noexcept { return state_->monitor.jump(); }
+bool ModelObserver::wrong_model() const noexcept { return state_->at_limit; }
+
+void ModelObserver::deviation(ModelCorrection& out) const noexcept {
+  out.disturbance_nm.setZero(state_->arm.dof());
+  state_->for_groups([&](auto& errors, auto&, int first) {
+    const int dof = errors.velocity();
+    const auto sigma = [&errors](int at) {
+      return std::sqrt(std::max(0.0, errors.matrix()(at, at)));
+    };
+    for (int j = 0; j < dof; ++j)
+      out.disturbance_nm[2 * first + j] = sigma(errors.disturbance() + j);
+    for (int i = 0; i < dof / 2; ++i) {
+      const int at = errors.parameters() + 5 * i;
+      out.segment[static_cast<std::size_t>(first + i)] = {
+          sigma(at), sigma(at + 1), sigma(at + 2), {sigma(at + 3), sigma(at + 4)}};
+    }
+    return true;
+  });
+}
+
+void ModelObserver::deviation(FilteredMotion& out) const noexcept {
+  const int n = state_->arm.size();
+  out.segments = n;
+  out.u_rad.setZero(2 * n);
+  out.velocity_radps.setZero(2 * n);
+  out.valid.fill(state_->running);
+  state_->for_groups([&](auto& errors, auto&, int first) {
+    const int dof = errors.velocity();
+    for (int j = 0; j < dof; ++j) {
+      out.u_rad[2 * first + j] = std::sqrt(std::max(0.0, errors.matrix()(j, j)));
+      out.velocity_radps[2 * first + j] =
+          std::sqrt(std::max(0.0, errors.matrix()(dof + j, dof + j)));
+    }
+    return true;
+  });
+}
+
+}  // namespace softarm

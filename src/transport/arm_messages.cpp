@@ -1,0 +1,100 @@
+#include "softarm/transport/arm_messages.hpp"
+
+#include <vector>
+
+#include "softarm/transport/message_decoding.hpp"
+
+namespace softarm {
+namespace {
+
+template <class Vector, class Number>
+void flatten(const std::vector<std::vector<Number>>& pairs, Vector& flat) {
+  flat.resize(static_cast<Eigen::Index>(2 * pairs.size()));
+  Eigen::Index k = 0;
+  for (const std::vector<Number>& pair : pairs)
+    for (const Number each : pair) flat[k++] = static_cast<double>(each);
+}
+
+template <class Vector, class Number>
+void copy(const std::vector<Number>& from, Vector& to) {
+  using Numbers = Eigen::Matrix<Number, Eigen::Dynamic, 1>;
+  to = Eigen::Map<const Numbers>(from.data(), static_cast<Eigen::Index>(from.size()))
+           .template cast<double>();
+}
+
+}  // namespace
+
+std::string ArmStatus::text() const { return std::string(name(mode)) + " (" + name(reason) + ")"; }
+
+bool decode(std::span<const std::byte> bytes, ArmStatus& out) {
+  using Message = softarm_messages::controller_status_t;
+  Message message;
+  if (!decode(bytes, message)) return false;
+  const auto has = [&](std::int16_t flag) { return (message.flags & flag) != 0; };
+  out.time_us = message.time_us;
+  out.tick = message.tick;
+  out.frame_number = message.frame_number;
+  out.configuration_hash = static_cast<std::uint64_t>(message.configuration_hash);
+  out.seed = static_cast<std::uint64_t>(message.seed);
+  out.version = message.version;
+  out.mode = static_cast<Mode>(message.mode);
+  out.reason = static_cast<Reason>(message.reason);
+  out.shadow = has(Message::SHADOW);
+  out.armed = has(Message::ARMED);
+  out.saturated = has(Message::SATURATED);
+  out.slew_limited = has(Message::SLEW_LIMITED);
+  out.reference_limited = has(Message::REFERENCE_LIMITED);
+  out.soft_limit = has(Message::SOFT_LIMIT);
+  out.bounded = has(Message::BOUNDED);
+  out.frame_age_s = static_cast<double>(message.frame_age_s);
+  out.frames_accepted = message.frames_accepted;
+  out.frames_rejected = message.frames_rejected;
+  out.frames_repeated = message.frames_repeated;
+  out.frames_missing = message.frames_missing;
+  out.overruns = message.overruns;
+  out.messages_malformed = message.messages_malformed;
+  flatten(message.u_rad, out.u_rad);
+  flatten(message.velocity_radps, out.velocity_radps);
+  flatten(message.reference_u_rad, out.reference_u_rad);
+  flatten(message.tau_actuation_nm, out.tau_actuation_nm);
+  copy(message.phi_rad, out.phi_rad);
+  copy(message.theta_rad, out.theta_rad);
+  copy(message.residual_twist_rad, out.torsion_rad);
+  copy(message.residual_length_m, out.length_error_m);
+  copy(message.pressure_bar, out.pressure_bar);
+  return true;
+}
+
+bool decode(std::span<const std::byte> bytes, PlantState& out) {
+  softarm_messages::plant_state_t message;
+  if (!decode(bytes, message)) return false;
+  out.time_us = message.time_us;
+  out.vented = message.vented != 0;
+  flatten(message.u_rad, out.u_rad);
+  flatten(message.velocity_radps, out.velocity_radps);
+  copy(message.pressure_bar, out.pressure_bar);
+  out.tip_m = Eigen::Map<const Eigen::Vector3d>(message.tip_m);
+  return true;
+}
+
+bool decode(std::span<const std::byte> bytes, bool by_torque, ChamberCommand& out) {
+  const auto take = [&](const auto& message, const auto& values) {
+    out.sequence = message.sequence;
+    out.time_us = message.time_us;
+    out.validity_us = message.validity_us;
+    out.shadow = message.shadow != 0;
+    copy(values, out.pressure_bar);
+  };
+  if (by_torque) {
+    softarm_messages::torque_command_t message;
+    if (!decode(bytes, message)) return false;
+    take(message, message.torque_nm);
+  } else {
+    softarm_messages::pressure_command_t message;
+    if (!decode(bytes, message)) return false;
+    take(message, message.pressure_bar);
+  }
+  return true;
+}
+
+}  // namespace softarm

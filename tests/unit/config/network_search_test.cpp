@@ -1,0 +1,59 @@
+// The network of files that load_experiment refuses.
+#include "softarm/config/network_search.hpp"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <fstream>
+#include <string>
+
+namespace softarm {
+namespace {
+
+namespace fs = std::filesystem;
+
+class NetworkSearch : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = fs::temp_directory_path() / ("softarm_network_" + std::to_string(getpid()));
+    fs::create_directories(folder_);
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+  fs::path write(const std::string& name, const std::string& text) const {
+    std::ofstream(folder_ / name) << text;
+    return folder_ / name;
+  }
+  fs::path folder_;
+};
+
+TEST_F(NetworkSearch, ReadsWhatStandsInBrokenYaml) {
+  const LcmSettings lcm = find_network(write("broken.yaml",
+                                             "name: [never closed\n"
+                                             "daemon:\n"
+                                             "  lcm: {url: \"udpm://239.1.2.3:4567?ttl=0\", "
+                                             "operator_channel: STOP}\n"
+                                             "#  lcm: {status_channel: COMMENTED}\n"
+                                             "  curl: other\n"
+                                             "  my_url: other\n"));
+  EXPECT_EQ(lcm.url, "udpm://239.1.2.3:4567?ttl=0");
+  EXPECT_EQ(lcm.operator_channel, "STOP");
+  EXPECT_EQ(lcm.status_channel, LcmSettings().status_channel);
+}
+
+TEST_F(NetworkSearch, FollowsIncludesAndWhatComesLaterCounts) {
+  write("base.yaml", "daemon:\n  lcm:\n    url: 'udpm://239.1.1.1:1'\n    status_channel: HERE\n");
+  const LcmSettings lcm = find_network(
+      write("top.yaml", "include: base.yaml\ntypo: 1\ndaemon: {lcm: {url: udpm://239.1.1.2:2}}\n"));
+  EXPECT_EQ(lcm.url, "udpm://239.1.1.2:2");
+  EXPECT_EQ(lcm.status_channel, "HERE");
+}
+
+TEST_F(NetworkSearch, EndsWhereFilesIncludeOneAnotherOrAreNotThere) {
+  const LcmSettings lcm =
+      find_network(write("round.yaml", "include: round.yaml\nurl: udpm://239.1.1.3:3\n"));
+  EXPECT_EQ(lcm.url, "udpm://239.1.1.3:3");
+  EXPECT_EQ(find_network(folder_ / "missing.yaml").url, LcmSettings().url);
+}
+
+}  // namespace
+}  // namespace softarm

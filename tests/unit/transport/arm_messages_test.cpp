@@ -1,0 +1,124 @@
+// What is on the wire as plain values: each in its place, and nothing taken that is not one
+// message.
+#include "softarm/transport/arm_messages.hpp"
+
+#include <gtest/gtest.h>
+
+#include "unit/transport/messages.hpp"
+
+namespace softarm {
+namespace {
+
+using namespace softarm_messages;
+using test::encoded;
+using test::example;
+
+TEST(ArmMessages, AStatusComesAsWhatItMeans) {
+  auto message = example<controller_status_t>(3, 4);
+  message.time_us = 11;
+  message.frame_number = 12;
+  message.configuration_hash = -1;
+  message.mode = 4;
+  message.reason = static_cast<std::int8_t>(Reason::frames_stale);
+  message.flags = controller_status_t::SHADOW | controller_status_t::BOUNDED;
+  message.frames_rejected = 13;
+  message.overruns = 14;
+  ArmStatus status;
+  status.u_rad = SegmentVector::Constant(20, 9.0);  // of another arm, before
+  ASSERT_TRUE(decode(encoded(message), status));
+  EXPECT_EQ(status.time_us, 11);
+  EXPECT_EQ(status.tick, 17);
+  EXPECT_EQ(status.frame_number, 12);
+  EXPECT_EQ(status.configuration_hash, ~std::uint64_t{0});
+  EXPECT_EQ(status.version, message.version);
+  EXPECT_EQ(status.text(), "VENT (frames_stale)");
+  EXPECT_TRUE(status.shadow && status.bounded);
+  EXPECT_FALSE(status.armed || status.saturated || status.slew_limited ||
+               status.reference_limited || status.soft_limit);
+  EXPECT_FLOAT_EQ(static_cast<float>(status.frame_age_s), 0.005F);
+  EXPECT_EQ(status.frames_rejected, 13);
+  EXPECT_EQ(status.overruns, 14);
+  EXPECT_EQ(status.messages_malformed, 3);
+  EXPECT_EQ(status.segments(), 3);
+  // pairs(3, first): first, first + 0.25; first + 1, ...
+  EXPECT_EQ(status.u_rad, (SegmentVector(6) << 1.0, 1.25, 2.0, 2.25, 3.0, 3.25).finished());
+  EXPECT_EQ(status.velocity_radps[5], 102.25);
+  EXPECT_EQ(status.reference_u_rad[0], 200.0);
+  EXPECT_EQ(status.phi_rad, (SegmentVector(3) << 300.0, 300.25, 300.5).finished());
+  EXPECT_EQ(status.theta_rad[2], 400.5);
+  EXPECT_EQ(status.tau_actuation_nm[1], 500.25);
+  EXPECT_EQ(status.torsion_rad[0], 600.0);
+  EXPECT_EQ(status.length_error_m[1], 700.25);
+  ASSERT_EQ(status.pressure_bar.size(), 12);
+  EXPECT_EQ(status.pressure_bar[11], 802.75);
+}
+
+TEST(ArmMessages, EveryFlagIsItsOwn) {
+  const std::pair<std::int16_t, bool ArmStatus::*> flags[] = {
+      {controller_status_t::SATURATED, &ArmStatus::saturated},
+      {controller_status_t::SLEW_LIMITED, &ArmStatus::slew_limited},
+      {controller_status_t::REFERENCE_LIMITED, &ArmStatus::reference_limited},
+      {controller_status_t::SOFT_LIMIT, &ArmStatus::soft_limit},
+      {controller_status_t::SHADOW, &ArmStatus::shadow},
+      {controller_status_t::ARMED, &ArmStatus::armed},
+      {controller_status_t::BOUNDED, &ArmStatus::bounded}};
+  for (const auto& [flag, set] : flags) {
+    auto message = example<controller_status_t>(1, 3);
+    message.flags = flag;
+    ArmStatus status;
+    ASSERT_TRUE(decode(encoded(message), status));
+    for (const auto& each : flags) EXPECT_EQ(status.*each.second, each.first == flag) << flag;
+  }
+}
+
+TEST(ArmMessages, MayPressuriseWhereItIsArmedOrHolds) {
+  for (const Mode mode :
+       {Mode::init, Mode::wait_frames, Mode::active, Mode::hold, Mode::vent, Mode::fault})
+    for (const bool armed : {false, true}) {
+      ArmStatus status;
+      status.mode = mode;
+      status.armed = armed;
+      EXPECT_EQ(status.may_pressurise(), armed || mode == Mode::active || mode == Mode::hold);
+    }
+}
+
+TEST(ArmMessages, APlantAndCommandsOfBothKinds) {
+  PlantState plant;
+  ASSERT_TRUE(decode(encoded(example<plant_state_t>(2, 3)), plant));
+  EXPECT_EQ(plant.segments(), 2);
+  EXPECT_TRUE(plant.vented);
+  EXPECT_EQ(plant.u_rad, (SegmentVector(4) << 1.0, 1.25, 2.0, 2.25).finished());
+  EXPECT_EQ(plant.velocity_radps[3], 51.25);
+  EXPECT_EQ(plant.pressure_bar[5], 1.25);
+  EXPECT_EQ(plant.tip_m, Eigen::Vector3d(0.0, 1.0, 2.0));
+
+  ChamberCommand command;
+  ASSERT_TRUE(decode(encoded(example<pressure_command_t>(1, 3)), false, command));
+  EXPECT_EQ(command.sequence, 42);
+  EXPECT_EQ(command.time_us, 43);
+  EXPECT_EQ(command.validity_us, 100'000);
+  EXPECT_TRUE(command.shadow);
+  EXPECT_EQ(command.pressure_bar, (PressureVector(3) << 0.5, 0.75, 1.0).finished());
+  ASSERT_TRUE(decode(encoded(example<torque_command_t>(1, 3)), true, command));
+  EXPECT_FALSE(command.shadow);
+  EXPECT_EQ(command.pressure_bar, (PressureVector(2) << -0.5, -0.25).finished());
+}
+
+TEST(ArmMessages, WhatIsNotExactlyOneMessageIsRefused) {
+  ArmStatus status;
+  PlantState plant;
+  ChamberCommand command;
+  auto bytes = encoded(example<controller_status_t>(3, 4));
+  EXPECT_FALSE(decode(bytes, plant));
+  EXPECT_FALSE(decode(bytes, false, command));
+  EXPECT_FALSE(decode(encoded(example<torque_command_t>(1, 3)), false, command));
+  EXPECT_FALSE(decode(encoded(example<pressure_command_t>(1, 3)), true, command));
+  bytes.push_back({});
+  EXPECT_FALSE(decode(bytes, status));
+  bytes.resize(bytes.size() - 2);
+  EXPECT_FALSE(decode(bytes, status));
+  EXPECT_FALSE(decode({}, status));
+}
+
+}  // namespace
+}  // namespace softarm

@@ -1,0 +1,76 @@
+// The table and the JSON of softarm-dev bench robustness.
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+
+#include "dev/bench/robustness_scenes.hpp"
+
+namespace softarm {
+namespace {
+
+std::string cell_text(const RobustnessTrial& trial) {
+  return trial.stayed_active ? fmt::format("{:.3g}", 1e3 * trial.u_rms_rad) : "left ACTIVE";
+}
+
+}  // namespace
+
+std::string table(const std::vector<RobustnessRow>& rows, const std::vector<ObserverCost>& costs) {
+  std::string text = fmt::format("{:<36}", "u [mrad rms], worst of the seeds");
+  if (rows.empty()) return text + "\n";
+  for (const RobustnessCell& cell : rows.front().cells)
+    text += fmt::format("{:>23}", name(cell.law));
+  text += fmt::format("{:>8}\n", "bound");
+  for (const RobustnessRow& row : rows) {
+    text += fmt::format("{:<36}", row.scene);
+    for (const RobustnessCell& cell : row.cells)
+      text += fmt::format("{:>23}", cell_text(cell.worst));
+    text += row.bound_mrad > 0.0 ? fmt::format("{:>8.3g}\n", row.bound_mrad) : "\n";
+  }
+  const RobustnessLaw last = rows.front().cells.back().law;
+  text += fmt::format("\n{}:\n{:<36}{:>10}{:>10}{:>10}{:>10}{:>10}{:>8}{:>10}\n", name(last), "",
+                      "largest", "tip", "pressure", "tick", "frame", "NIS", "surprised");
+  text += fmt::format("{:<36}{:>10}{:>10}{:>10}{:>10}{:>10}{:>8}{:>10}\n", "", "[mrad]", "[mm]",
+                      "[bar/s]", "[us]", "[us]", "", "[%]");
+  for (const RobustnessRow& row : rows) {
+    const RobustnessTrial& trial = row.cells.back().worst;
+    text += fmt::format("{:<36}{:>10.3g}{:>10.3g}{:>10.3g}{:>10.1f}{:>10.1f}{:>8.3f}{:>10.2g}\n",
+                        row.scene, 1e3 * trial.u_largest_rad, 1e3 * trial.tip_rms_m,
+                        trial.pressure_rate_bar_per_s, trial.tick_us, trial.frame_tick_us,
+                        trial.nis, 100.0 * trial.surprised);
+  }
+  text += fmt::format("\n{:<36}{:>10}{:>10}\n", "the observer alone, segments", "tick [us]",
+                      "frame [us]");
+  for (const ObserverCost& cost : costs)
+    text += fmt::format("{:<36}{:>10.1f}{:>10.1f}\n", cost.segments, cost.tick_us, cost.frame_us);
+  return text;
+}
+
+std::string json(const std::vector<RobustnessRow>& rows, const std::vector<ObserverCost>& costs) {
+  using Json = nlohmann::ordered_json;
+  Json scenes = Json::array(), observer_costs = Json::array();
+  for (const RobustnessRow& row : rows) {
+    Json laws = Json::array();
+    for (const RobustnessCell& cell : row.cells) {
+      const RobustnessTrial& trial = cell.worst;
+      laws.push_back({{"law", name(cell.law)},
+                      {"u_rms_rad", trial.u_rms_rad},
+                      {"u_largest_rad", trial.u_largest_rad},
+                      {"tip_rms_m", trial.tip_rms_m},
+                      {"pressure_rate_bar_per_s", trial.pressure_rate_bar_per_s},
+                      {"tick_us", trial.tick_us},
+                      {"frame_tick_us", trial.frame_tick_us},
+                      {"nis", trial.nis},
+                      {"surprised", trial.surprised},
+                      {"stayed_active", trial.stayed_active}});
+    }
+    scenes.push_back(
+        {{"scene", row.scene}, {"bound_mrad", row.bound_mrad}, {"laws", std::move(laws)}});
+  }
+  for (const ObserverCost& cost : costs)
+    observer_costs.push_back(
+        {{"segments", cost.segments}, {"tick_us", cost.tick_us}, {"frame_us", cost.frame_us}});
+  const Json report{{"scenes", std::move(scenes)}, {"observer_costs", std::move(observer_costs)}};
+  return report.dump() + "\n";
+}
+
+}  // namespace softarm

@@ -1,0 +1,86 @@
+// softarm-dev bench robustness: arms that are not their model, and sensors and valves that are not
+// ideal.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "softarm/config/experiment.hpp"
+#include "softarm/estimation/mocap_frame.hpp"
+
+namespace softarm {
+
+/// What stands between the loop and the simulated arm, beyond what PlantSettings knows.
+struct LoopFaults {
+  /// Changes a frame on its way; false: it does not arrive.
+  std::function<bool(MocapFrame&)> frame;
+  double play_bar = 0.0;        ///< half the backlash between set point and pressure, every valve
+  double resolution_bar = 0.0;  ///< of the pressure behind it
+  /// Part of every pressure that goes through play operators of 0.02, 0.05 and 0.1 bar: loops
+  /// between pressure and moment, as a material with hysteresis has.
+  double hysteresis = 0.0;
+};
+
+/// One row of the table.
+struct RobustnessScene {
+  std::string name;
+  double bound_mrad = 0.0;  ///< of the observer with parameters; 0: none
+  std::function<void(Experiment&)> change;
+  LoopFaults faults;
+  bool nominal = false;         ///< no lag, exact sensing: paper_arm_nominal.yaml
+  double counted_from_s = 1.0;  ///< after ACTIVE
+  double counted_s = 20.0;
+};
+
+std::vector<RobustnessScene> robustness_scenes();
+
+/// A control law of the comparison, from the experiments that come with softarm.
+enum class RobustnessLaw { paper17, statics_pi, integral, observer, observer_parameters };
+inline constexpr RobustnessLaw kRobustnessLaws[] = {
+    RobustnessLaw::paper17, RobustnessLaw::statics_pi, RobustnessLaw::integral,
+    RobustnessLaw::observer, RobustnessLaw::observer_parameters};
+const char* name(RobustnessLaw law);
+
+/// `config(name)` loads an experiment that comes with softarm.
+Experiment robustness_experiment(const RobustnessScene& scene, RobustnessLaw law,
+                                 const std::function<Experiment(const std::string&)>& config);
+
+/// How a run went. Errors are reference minus the arm's true u, a component; NaN where the arm was
+/// not ACTIVE.
+struct RobustnessTrial {
+  double u_rms_rad = 0.0, u_largest_rad = 0.0;
+  double tip_rms_m = 0.0;                ///< from where the tip would be at u_ref on a PCC arm
+  double pressure_rate_bar_per_s = 0.0;  ///< RMS of all commanded pressures
+  /// Wall clock of a tick: its median, and 90 % of all, which is one with a frame.
+  double tick_us = 0.0, frame_tick_us = 0.0;
+  double nis = 0.0;        ///< mean, of an observer
+  double surprised = 0.0;  ///< part of the frames
+  bool stayed_active = true;
+};
+RobustnessTrial run(const Experiment& experiment, const RobustnessScene& scene, std::uint64_t seed);
+
+/// A scene under one law, the worst over the seeds of every figure.
+struct RobustnessCell {
+  RobustnessLaw law;
+  RobustnessTrial worst;
+};
+struct RobustnessRow {
+  std::string scene;
+  double bound_mrad = 0.0;
+  std::vector<RobustnessCell> cells;
+};
+
+/// Processor time of the observer, median, with frames at 200 Hz that are 5 ms late, 500 Hz ticks.
+struct ObserverCost {
+  int segments;
+  double tick_us;   ///< a prediction under one more command
+  double frame_us;  ///< a frame, and the prediction from there
+};
+std::vector<ObserverCost> observer_costs();
+
+std::string table(const std::vector<RobustnessRow>& rows, const std::vector<ObserverCost>& costs);
+std::string json(const std::vector<RobustnessRow>& rows, const std::vector<ObserverCost>& costs);
+
+}  // namespace softarm

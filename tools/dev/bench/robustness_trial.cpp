@@ -1,0 +1,140 @@
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "dev/bench/robustness_scenes.hpp"
+#include "softarm/base/clock.hpp"
+#include "softarm/base/time.hpp"
+#include "softarm/estimation/model_observer.hpp"
+#include "softarm/model/kinematics.hpp"
+#include "softarm/runtime/control_pipeline.hpp"
+#include "softarm/simulation/simulated_arm.hpp"
+
+namespace softarm {
+namespace {
+
+/// Backlash: the output follows the input at a distance of at most `half_width`.
+double play(double output, double input, double half_width) {
+  return std::clamp(output, input - half_width, input + half_width);
+}
+
+/// Valves with backlash, and chambers whose moment depends on the way they were filled.
+class CommandFaults {
+ public:
+  CommandFaults(const LoopFaults& faults, Eigen::Index chambers) : faults_(faults) {
+    valve_.setZero(chambers);
+    for (PressureVector& each : inner_) each.setZero(chambers);
+  }
+
+  void apply(PressureVector& bar) {
+    static constexpr double kInnerPlay_bar[] = {0.02, 0.05, 0.1};
+    for (Eigen::Index j = 0; j < bar.size(); ++j) {
+      if (faults_.play_bar > 0.0) {
+        valve_[j] = play(valve_[j], bar[j], faults_.play_bar);
+        bar[j] = valve_[j];
+      }
+      if (faults_.resolution_bar > 0.0)
+        bar[j] = faults_.resolution_bar * std::round(bar[j] / faults_.resolution_bar);
+      if (faults_.hysteresis > 0.0) {
+        double mean = 0.0;
+        for (std::size_t k = 0; k < inner_.size(); ++k) {
+          inner_[k][j] = play(inner_[k][j], bar[j], kInnerPlay_bar[k]);
+          mean += inner_[k][j] / static_cast<double>(inner_.size());
+        }
+        bar[j] += faults_.hysteresis * (mean - bar[j]);
+      }
+      bar[j] = std::max(bar[j], 0.0);
+    }
+  }
+
+ private:
+  LoopFaults faults_;
+  PressureVector valve_;
+  std::array<PressureVector, 3> inner_;
+};
+
+double quantile_us(std::vector<std::int64_t>& durations_ns, double fraction) {
+  const auto at = durations_ns.begin() +
+                  static_cast<std::ptrdiff_t>(fraction * static_cast<double>(durations_ns.size()));
+  std::nth_element(durations_ns.begin(), at, durations_ns.end());
+  return 1e-3 * static_cast<double>(*at);
+}
+
+}  // namespace
+
+RobustnessTrial run(const Experiment& asked, const RobustnessScene& scene, std::uint64_t seed) {
+  Experiment e = asked;
+  e.plant.seed = seed;
+  ControlPipeline pipeline(e);
+  SimulatedArm arm(e.plant, 0);
+  CommandFaults faults(scene.faults, pipeline.output().pressure_bar.size());
+  const std::int64_t period_ns = pipeline.period_ns();
+  const std::int64_t validity_ns = to_ns(e.safety.command_validity_s);
+  std::vector<MocapFrame> frames;
+  std::vector<double> sent;
+  PressureVector measured, wanted, before;
+  std::vector<std::int64_t> ticks_ns;
+  RobustnessTrial trial;
+  double u_squares = 0.0, tip_squares = 0.0, rate_squares = 0.0, nis = 0.0;
+  std::int64_t counted = 0, surprised = 0, active_since_ns = -1;
+  const double until_s = scene.counted_from_s + scene.counted_s;
+  constexpr std::int64_t kPatience_ns = 10'000'000'000;
+  for (std::int64_t now_ns = 0;; now_ns += period_ns) {
+    if (active_since_ns < 0 ? now_ns > kPatience_ns
+                            : to_seconds(now_ns - active_since_ns) > until_s)
+      break;
+    arm.advance_to(now_ns);
+    frames.clear();
+    for (MocapFrame frame; arm.receive(frame);)
+      if (!scene.faults.frame || scene.faults.frame(frame)) frames.push_back(frame);
+    measured = arm.measured_pressures_bar();
+    TickInput input;
+    input.now_ns = now_ns;
+    input.frames = frames;
+    input.newest_go_ns = input.newest_measurement_ns = now_ns;
+    input.measured_bar = &measured;
+    before = pipeline.output().pressure_bar;
+    const std::int64_t begin_ns = monotonic_now_ns();
+    const TickOutput& output = pipeline.tick(input);
+    ticks_ns.push_back(monotonic_now_ns() - begin_ns);
+    wanted = output.pressure_bar;
+    faults.apply(wanted);
+    sent.assign(wanted.begin(), wanted.end());
+    arm.command({.sequence = now_ns / period_ns + 1,
+                 .validity_ns = validity_ns,
+                 .shadow = false,
+                 .pressure_bar = sent},
+                now_ns);
+    if (output.mode != Mode::active) {
+      trial.stayed_active &= active_since_ns < 0;
+      continue;
+    }
+    if (active_since_ns < 0) active_since_ns = now_ns;
+    if (to_seconds(now_ns - active_since_ns) < scene.counted_from_s) continue;
+    arm.advance_to(now_ns + period_ns / 2);
+    const SegmentVector error = output.reference.u - arm.plant().u_rad();
+    u_squares += error.squaredNorm() / static_cast<double>(error.size());
+    trial.u_largest_rad = std::max(trial.u_largest_rad, error.cwiseAbs().maxCoeff());
+    const Eigen::Vector3d tip_ref = tip_position(e.arm, output.reference.u);
+    tip_squares += (tip_position(e.arm, arm.plant().u_rad()) - tip_ref).squaredNorm();
+    rate_squares += ((output.pressure_bar - before) * e.rate_hz).squaredNorm() /
+                    static_cast<double>(before.size());
+    if (output.observer != nullptr) {
+      nis += output.observer->nis();
+      surprised += output.observer->surprised() ? 1 : 0;
+    }
+    ++counted;
+  }
+  trial.stayed_active &= active_since_ns >= 0;
+  const double count = static_cast<double>(counted);
+  trial.u_rms_rad = std::sqrt(u_squares / count);
+  trial.tip_rms_m = std::sqrt(tip_squares / count);
+  trial.pressure_rate_bar_per_s = std::sqrt(rate_squares / count);
+  trial.nis = nis / count;
+  trial.surprised = static_cast<double>(surprised) / count;
+  trial.tick_us = quantile_us(ticks_ns, 0.5);
+  trial.frame_tick_us = quantile_us(ticks_ns, 0.9);
+  return trial;
+}
+
+}  // namespace softarm

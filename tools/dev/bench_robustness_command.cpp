@@ -1,0 +1,82 @@
+// softarm-dev bench robustness: arms that are not their model, under five control laws.
+#include <cstdio>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "apps/program.hpp"
+#include "apps/progress.hpp"
+#include "dev/bench/robustness_scenes.hpp"
+#include "dev/commands.hpp"
+#include "softarm/config/load.hpp"
+
+namespace softarm {
+namespace {
+
+struct RobustnessOptions {
+  int seeds = 5;
+  std::string scene, law;
+  bool json = false;
+};
+
+Experiment shipped_config(const std::string& name) {
+  return load_experiment(shared_file("config/" + name, SOFTARM_CONFIG_FOLDER "/" + name));
+}
+
+/// The worst of every figure.
+void join(RobustnessTrial& worst, const RobustnessTrial& other) {
+  const auto larger = [](double& a, double b) {
+    if (!(b <= a)) a = b;
+  };
+  larger(worst.u_rms_rad, other.u_rms_rad);
+  larger(worst.u_largest_rad, other.u_largest_rad);
+  larger(worst.tip_rms_m, other.tip_rms_m);
+  larger(worst.pressure_rate_bar_per_s, other.pressure_rate_bar_per_s);
+  larger(worst.tick_us, other.tick_us);
+  larger(worst.frame_tick_us, other.frame_tick_us);
+  larger(worst.nis, other.nis);
+  larger(worst.surprised, other.surprised);
+  worst.stayed_active &= other.stayed_active;
+}
+
+void measure_robustness(const RobustnessOptions& options) {
+  std::vector<RobustnessRow> rows;
+  const std::vector<ObserverCost> costs = observer_costs();
+  {
+    Progress progress(true);
+    for (const RobustnessScene& scene : robustness_scenes()) {
+      if (scene.name.find(options.scene) == std::string::npos) continue;
+      RobustnessRow& row = rows.emplace_back(RobustnessRow{scene.name, scene.bound_mrad, {}});
+      for (const RobustnessLaw law : kRobustnessLaws) {
+        if (!options.law.empty() && options.law != name(law)) continue;
+        progress.update(scene.name + ": " + name(law));
+        const Experiment experiment = robustness_experiment(scene, law, shipped_config);
+        RobustnessTrial worst = run(experiment, scene, 1);
+        for (int seed = 2; seed <= options.seeds; ++seed)
+          join(worst, run(experiment, scene, static_cast<std::uint64_t>(seed)));
+        row.cells.push_back({law, worst});
+      }
+    }
+  }
+  const std::string text = options.json ? json(rows, costs) : table(rows, costs);
+  std::fwrite(text.data(), 1, text.size(), stdout);
+}
+
+}  // namespace
+
+void add_bench_robustness_command(CLI::App& group) {
+  auto options = std::make_shared<RobustnessOptions>();
+  CLI::App* command = group.add_subcommand(
+      "robustness", "Tracking errors on arms, valves and frames that are not as configured");
+  command->add_flag("--json", options->json, "print JSON instead of tables");
+  command->add_option("--seeds", options->seeds, "runs of every scene")
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str();
+  command->add_option("--scene", options->scene, "only scenes whose name contains this");
+  std::vector<std::string> laws;
+  for (const RobustnessLaw law : kRobustnessLaws) laws.emplace_back(name(law));
+  command->add_option("--law", options->law, "only this one")->check(CLI::IsMember(laws));
+  command->callback([options] { measure_robustness(*options); });
+}
+
+}  // namespace softarm
