@@ -36,8 +36,7 @@ struct Inputs {
 
 /// Derivative along x, and twice along a and b.
 template <bool kFirst, bool kSecond, class Coefficients, class Segments>
-Vec3<Lanes> own(const Coefficients& f, const Segments& k,
-                               const DirectionOf<Lanes>& x) noexcept {
+Vec3<Lanes> own(const Coefficients& f, const Segments& k, const DirectionOf<Lanes>& x) noexcept {
   if constexpr (kFirst && kSecond) {
     return second(f, k.ux, k.uy, k.a, k.b) + first(f, k.ux, k.uy, x);
   }
@@ -101,19 +100,20 @@ void prepare(const ArmParameters& arm, const Inputs& in, int begin, Segments& k)
   } else if constexpr (kArc) {
     k.a = k.b = DirectionOf<Lanes>{};
   }
+  DirectionOf<Lanes> grown = x;  // x + e_b a + e_a b: of what has a length
+  if constexpr (kExtensible && kCoriolis) {
+    k.strain_a = load_strain_rate(in.a + at, count, k.inverse_length);
+    k.strain_b = load_strain_rate(in.b + at, count, k.inverse_length);
+    grown.x += k.strain_b * k.a.x + k.strain_a * k.b.x;
+    grown.y += k.strain_b * k.a.y + k.strain_a * k.b.y;
+    grown.along += k.strain_b * k.a.along + k.strain_a * k.b.along;
+  }
   if constexpr (kInertia || kCoriolis) {
-    if constexpr (kExtensible && kCoriolis) {
-      k.strain_a = load_strain_rate(in.a + at, count, k.inverse_length);
-      k.strain_b = load_strain_rate(in.b + at, count, k.inverse_length);
-      x.x += k.strain_b * k.a.x + k.strain_a * k.b.x;
-      x.y += k.strain_b * k.a.y + k.strain_a * k.b.y;
-      x.along += k.strain_b * k.a.along + k.strain_a * k.b.along;
-    }
-    k.own_tip = own<kFirst, kCoriolis>(k.tip, k, x);
-    k.own_centre = own<kFirst, kCoriolis>(k.centre, k, x);
+    k.own_tip = own<kFirst, kCoriolis>(k.tip, k, grown);
+    k.own_centre = own<kFirst, kCoriolis>(k.centre, k, grown);
     k.own_spin = own<kInertia, kCoriolis>(k.turn_rate, k, x);
   }
-  if constexpr (kArc) own_arc(x, k);
+  if constexpr (kArc) own_arc(grown, k);
   if constexpr (kExtensible && kInertia) {
     add_strain<kArc>(load_strain_rate(in.x + at, count, k.inverse_length), k);
   }
@@ -274,8 +274,8 @@ SOFTARM_INLINE void advance(const SegmentLanes& k, int l, const Frame& f, FrameM
 }
 
 template <MassModel kMass, bool kExtensible, bool kInertia, bool kCoriolis>
-void outward(const ArmParameters& arm, const Inputs& in, Vector3 base,
-             LanesOf<kExtensible>* lanes, ForcesOf<kExtensible>* out) noexcept {
+void outward(const ArmParameters& arm, const Inputs& in, Vector3 base, LanesOf<kExtensible>* lanes,
+             ForcesOf<kExtensible>* out) noexcept {
   const int n = arm.size();
   FrameMotion m{{0, 0, 0}, {0, 0, 0}, {0, 0, 0}, base};
   const auto add_thickness = [&](int i, const SegmentLanes& k) {

@@ -68,10 +68,24 @@ struct Errors {
   }
 };
 
+/// Is there a B to divide by in double? Not with point masses of long arms, every segment of which
+/// costs a digit; nor of segments that stretch and are bent by nearly a full turn, whose own columns
+/// vanish there.
+inline bool solvable(const ArmParameters& arm, const State& state) {
+  if (arm.mass == MassModel::distributed) return true;
+  double theta = 0.0;
+  for (int i = 0; arm.extensible && i < arm.size(); ++i) {
+    theta = std::max(theta, state.u.segment<2>(3 * i).norm());
+  }
+  return arm.size() <= 7 && theta < 5.5;
+}
+
 class AgainstReference {
  public:
   /// @param state u, u' and u'' for the recursion; its second velocity is made of the two.
-  AgainstReference(const ArmParameters& arm, const State& state, bool with_forward = true)
+  AgainstReference(const ArmParameters& arm, const State& state)
+      : AgainstReference(arm, state, solvable(arm, state)) {}
+  AgainstReference(const ArmParameters& arm, const State& state, bool with_forward)
       : arm_(arm),
         state_(state),
         dof_(arm.dof()),
@@ -79,7 +93,7 @@ class AgainstReference {
         u_(state.u.cast<long double>()),
         v_(state.v.cast<long double>()),
         want_(reference::dynamics(arm, u_, v_)) {
-    speed_ = rate(arm, u_, v_);
+    speed_ = largest_rate(arm, u_, v_);
     kinematics();
     matrices();
     recursion();

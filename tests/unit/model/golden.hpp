@@ -77,6 +77,18 @@ inline Terms terms(const YAML::Node& node) {
   return result;
 }
 
+/// What stands under `chambers`, of all segments one after the other.
+inline Terms chamber_terms(const YAML::Node& node) {
+  Terms result;
+  for (const auto& entry : node["chambers"]) {
+    std::vector<double> numbers;
+    flatten(entry.second, numbers);
+    result[entry.first.as<std::string>()] =
+        Eigen::Map<Eigen::VectorXd>(numbers.data(), static_cast<Eigen::Index>(numbers.size()));
+  }
+  return result;
+}
+
 inline void read_extensible(const YAML::Node& node, Case& c) {
   const YAML::Node config = node["config"];
   c.arm.extensible = true;
@@ -88,12 +100,7 @@ inline void read_extensible(const YAML::Node& node, Case& c) {
                           .offset_m = chambers["r"].as<double>(),
                           .area_n_per_bar = chambers["a"].as<double>()});
   }
-  for (const auto& entry : node["chambers"]) {
-    std::vector<double> numbers;
-    flatten(entry.second, numbers);
-    c.chamber[entry.first.as<std::string>()] =
-        Eigen::Map<Eigen::VectorXd>(numbers.data(), static_cast<Eigen::Index>(numbers.size()));
-  }
+  c.chamber = chamber_terms(node);
 }
 
 inline Case read_case(const YAML::Node& node) {

@@ -44,7 +44,7 @@ inline Eigen::VectorXd sizes_by_unit(const ArmParameters& arm, const Eigen::Matr
 
 /// Largest |u'| and |e'| / l of the arm.
 template <class Vector>
-double rate(const ArmParameters& arm, const Vector& u, const Vector& velocity) {
+double largest_rate(const ArmParameters& arm, const Vector& u, const Vector& velocity) {
   double result = 0.0;
   for (int i = 0; i < arm.dof(); ++i) {
     const double length =
