@@ -96,8 +96,9 @@ static void describe(Keys& key, ModelObserverSettings& it) {
 }
 
 static void describe(Keys& key, EstimationSettings& it) {
-  KEY(method, one_of({"pose", "orientation", "printed"}),
-      "pose: position and orientation; orientation: inertial sensors; printed: the paper's (20), "
+  KEY(method, one_of({"pose", "orientation", "paper_eq20"}),
+      "pose: position and orientation; orientation: inertial sensors; paper_eq20: the paper's "
+      "(20), "
       "for comparison only");
   KEY(position_noise_m, above(0, 1), "standard deviation an axis of every measured body");
   KEY(orientation_noise_rad, above(0, 1), "the same, of its rotation vector");

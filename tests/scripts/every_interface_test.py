@@ -48,7 +48,7 @@ class EveryInterface(unittest.TestCase):
         return tracking["u_rms_rad"], tracking["tip_rms_m"]
 
     def test_tracking_is_no_worse_than_1_2_times(self):
-        port = str(20000 + os.getpid() % 40000)
+        port = str(20000 + os.getpid() % 12000)
         valves = f"valves: {{port: {port}}}\n"
         ours, every = self.config("paper_arm"), self.config("paper_arm_every_interface", valves)
         plain = ((PROGRAMS / "softarmd", ours), (PROGRAMS / "softarm-plant", ours))

@@ -40,7 +40,7 @@ class Mocap(unittest.TestCase):
         tracks_within(self, PROGRAMS, config, BOUND_RAD)
 
     def test_the_loop_closes_through_optitrack_frames_and_modbus(self):
-        port = str(20000 + os.getpid() % 40000)
+        port = str(20000 + os.getpid() % 12000)
         valves = f"valves: {{port: {port}}}\n"
         every = self.config("paper_arm_every_interface", valves)
         # A machine that is busy with other things must not look like a faulty terminal.

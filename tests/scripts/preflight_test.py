@@ -37,7 +37,7 @@ class Arm:
     def __init__(self, test, base="paper_arm.yaml", more=ARM):
         Arm.count += 1
         self.test, self.base, self.more = test, base, more
-        self.url = f"udpm://239.255.76.67:{20000 + (32 * os.getpid() + Arm.count) % 40000}?ttl=0"
+        self.url = f"udpm://239.255.76.67:{20000 + (32 * os.getpid() + Arm.count) % 12000}?ttl=0"
         temporary = tempfile.TemporaryDirectory()
         test.addClassCleanup(temporary.cleanup)
         self.folder = pathlib.Path(temporary.name)

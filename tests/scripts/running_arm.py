@@ -32,7 +32,7 @@ def go_on_in_our_python():
 
 
 def own_url():
-    return f"udpm://239.255.76.67:{20000 + os.getpid() % 40000}?ttl=0"
+    return f"udpm://239.255.76.67:{20000 + os.getpid() % 12000}?ttl=0"
 
 
 def write_config(folder, base, url, more=""):

@@ -11,7 +11,7 @@ class MocapSender : public ::testing::TestWithParam<const char*>, protected test
  protected:
   void SetUp() override {
     try {
-      listen();
+      listen(GetParam());
     } catch (const TransportError& error) {
       GTEST_SKIP() << error.what();
     }
@@ -20,7 +20,7 @@ class MocapSender : public ::testing::TestWithParam<const char*>, protected test
 
 TEST_P(MocapSender, MakesTheDaemonActive) {
   write_config(GetParam(), "");
-  const auto daemon = start("softarmd");
+  const auto daemon = start("softarmd", {"--shadow"});
   ASSERT_TRUE(wait_for([&] { return mode() == Mode::wait_frames; })) << daemon->printed();
   const auto sender = start("example_mocap_sender");
   ASSERT_TRUE(wait_for([&] { return mode() == Mode::active; }))

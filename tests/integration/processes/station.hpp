@@ -32,7 +32,7 @@ class Station {
     folder_ = std::filesystem::temp_directory_path() / ("softarm_" + text);
     std::filesystem::create_directories(folder_);
     // A port of its own, so that tests may run side by side.
-    url_ = "udpm://239.255.76.67:" + std::to_string(20000 + (8 * getpid() + number) % 40000) +
+    url_ = "udpm://239.255.76.67:" + std::to_string(20000 + (8 * getpid() + number) % 12000) +
            "?ttl=0";
     write_config("paper_arm.yaml", "");
   }
@@ -40,9 +40,9 @@ class Station {
   Station(const Station&) = delete;
   Station& operator=(const Station&) = delete;
 
-  /// Begins to listen, whatever the configuration under test is. @throws TransportError
-  void listen() {
-    Experiment arm = load_experiment(SOFTARM_SOURCE_DIR "/config/paper_arm.yaml");
+  /// Begins to listen to an arm with as many segments as that of config/BASE. @throws TransportError
+  void listen(const std::string& base = "paper_arm.yaml") {
+    Experiment arm = load_experiment(SOFTARM_SOURCE_DIR "/config/" + base);
     arm.transport.lcm.url = url_;
     client_ = std::make_unique<ArmClient>(arm);
     client_->on_status([this](const ArmStatus& status) {

@@ -201,7 +201,7 @@ TEST_F(Recordings, SineJudgedAsAHundredHertzStreamHoldsAndVentsAtItsGaps) {
 TEST_F(Recordings, PlayedIntoAShadowDaemonTheyGoThroughThePipeline) {
   const auto log = import("four_columns_circle.csv", "circle_map.yaml");
   const std::string url =
-      "udpm://239.255.76.67:" + std::to_string(20000 + getpid() % 40000) + "?ttl=0";
+      "udpm://239.255.76.67:" + std::to_string(20000 + getpid() % 12000) + "?ttl=0";
   const auto config = folder_ / "config.yaml";
   std::ofstream(config) << "include: " << kSource / "config" / "recorded_circle.yaml"
                         << "\ndaemon:\n  lcm: {url: \"" << url << "\"}\n";

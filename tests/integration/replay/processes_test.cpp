@@ -34,7 +34,7 @@ class ReplayOfProcesses : public ::testing::Test {
     folder_ =
         std::filesystem::temp_directory_path() / ("softarm_replay_" + std::to_string(getpid()));
     std::filesystem::create_directories(folder_);
-    url_ = "udpm://239.255.76.67:" + std::to_string(20000 + getpid() % 40000) + "?ttl=0";
+    url_ = "udpm://239.255.76.67:" + std::to_string(20000 + getpid() % 12000) + "?ttl=0";
     config_ = folder_ / "config.yaml";
     log_ = folder_ / "log";
     experiment_.transport.lcm.url = url_;

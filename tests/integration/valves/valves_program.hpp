@@ -31,7 +31,7 @@ class ValvesProgram : public ::testing::Test {
               ("softarm_" + std::to_string(getpid()) + "_" +
                ::testing::UnitTest::GetInstance()->current_test_info()->name());
     std::filesystem::create_directories(folder_);
-    url_ = "udpm://239.255.76.67:" + std::to_string(20000 + getpid() % 40000) + "?ttl=0";
+    url_ = "udpm://239.255.76.67:" + std::to_string(20000 + getpid() % 12000) + "?ttl=0";
     try {
       node_ = std::make_unique<LcmNode>(url_);
       node_->subscribe("SOFTARM_VALVES", 4096, [this](const ReceivedMessage& packet) {

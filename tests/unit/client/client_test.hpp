@@ -21,7 +21,7 @@ class ClientTest : public ::testing::Test {
  protected:
   ClientTest() {
     experiment.transport.lcm.url =
-        "udpm://239.255.76.67:" + std::to_string(20000 + getpid() % 40000) + "?ttl=0";
+        "udpm://239.255.76.67:" + std::to_string(20000 + getpid() % 12000) + "?ttl=0";
     experiment.transport.lcm.deadman_channel = "SOFTARM_GO";
     experiment.actuation.max_pressure_bar = 1.5;
     experiment.actuation.slew_bar_per_s = 4.0;

@@ -73,7 +73,7 @@ const Spoilt kSpoilt[] = {
     {"    rotation: hanging", "    rotation: sideways", "arm.base.rotation", "hanging, standing"},
     {"{coriolis: true}", "{coriolis: yes}", "control.terms.coriolis", "true or false"},
     {"{coriolis: true}", "off", "control.terms", "a section"},
-    {"  method: pose", "  method: best", "estimation.method", "pose, orientation, printed"},
+    {"  method: pose", "  method: best", "estimation.method", "pose, orientation, paper_eq20"},
     {"kind: set_point", "kind: setpoint", "reference[0].kind",
      "set_point, paper, way_points, live"},
     {"    base_id: 0", "    base_id: none", "daemon.bodies.base_id", "fixed or a whole number"},

@@ -36,7 +36,7 @@ class DaemonLinkOverUdp : public ::testing::Test {
     settings.safety.pressure_tolerance_bar = 100.0;  // the messages here follow nobody
     transport.lcm.deadman_channel = "SOFTARM_GO";
     transport.lcm.url =
-        "udpm://239.255.76.67:" + std::to_string(20000 + getpid() % 40000) + "?ttl=0";
+        "udpm://239.255.76.67:" + std::to_string(20000 + getpid() % 12000) + "?ttl=0";
   }
   void SetUp() override {
     try {

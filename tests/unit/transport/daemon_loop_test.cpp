@@ -29,7 +29,7 @@ class DaemonLoopOverUdp : public ::testing::Test {
     settings.rate_hz = 200.0;
     transport.bodies = {.base_id = 0, .segment_ids = {1}};
     transport.lcm.url =
-        "udpm://239.255.76.67:" + std::to_string(20000 + getpid() % 40000) + "?ttl=0";
+        "udpm://239.255.76.67:" + std::to_string(20000 + getpid() % 12000) + "?ttl=0";
     try {
       listener = std::make_unique<LcmNode>(transport.lcm.url);
       listener->subscribe(transport.lcm.command_channel, 4096, [this](const ReceivedMessage& each) {

@@ -84,7 +84,7 @@ class Scene {
         "false}}\n"
         "  realtime: {{fifo: {}, priority: {}, cpu: {}}}\n",
         std::filesystem::absolute(options.config).string(), kTheta_rad, options.rate_hz,
-        20000 + getpid() % 40000, result.fifo, kPriority,
+        20000 + getpid() % 12000, result.fifo, kPriority,
         options.cpu < 0 ? "any" : std::to_string(options.cpu));
     experiment_ = load_experiment(folder_ / "loop.yaml");
     if (experiment_.transport.mocap.source != softarm_mocap())

@@ -37,7 +37,7 @@ std::filesystem::path write_soak_config(const SoakOptions& options) {
       "0.25,\n"
       "    valve_readback: true, valve_silence_s: 0.4, deadman_timeout_s: 1.5}}\n"
       "plant: {{mocap: {{rate_hz: 500}}}}\n",
-      std::filesystem::absolute(options.config).string(), options.seed, 20000 + getpid() % 40000);
+      std::filesystem::absolute(options.config).string(), options.seed, 20000 + getpid() % 12000);
   return path;
 }
 
