@@ -5,13 +5,18 @@ from __future__ import annotations
 import numpy
 import os
 import typing
-__all__: list[str] = ['Allocator', 'Arm', 'ControlPipeline', 'Controller', 'Experiment', 'Frame', 'Plant', 'PlantError', 'SimulatedArm', 'Tick', 'advance', 'load_experiment', 'polar_to_u', 'run', 'u_to_polar']
+__all__: list[str] = ['Allocator', 'Arm', 'ArmClient', 'ControlPipeline', 'Controller', 'Experiment', 'Frame', 'Plant', 'PlantError', 'PlantState', 'SimulatedArm', 'Status', 'Tick', 'TransportError', 'advance', 'load_experiment', 'polar_to_u', 'run', 'u_to_polar']
 class Experiment:
     """
     An experiment as in its file, checked, with every default filled in.
     """
     def __repr__(self) -> str:
         ...
+    @property
+    def chambers(self) -> list[int]:
+        """
+        number of chambers of every segment
+        """
     @property
     def duration_s(self) -> float:
         ...
@@ -329,6 +334,157 @@ class SimulatedArm:
         ...
     @property
     def vented(self) -> bool:
+        ...
+class Status:
+    """
+    What the daemon measured, decided and commanded in one tick.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def armed(self) -> bool:
+        ...
+    @property
+    def frame_age_s(self) -> float:
+        ...
+    @property
+    def frames_rejected(self) -> int:
+        ...
+    @property
+    def mode(self) -> str:
+        ...
+    @property
+    def pressure_bar(self) -> numpy.ndarray:
+        """
+        commanded
+        """
+    @property
+    def reason(self) -> str:
+        ...
+    @property
+    def reference_limited(self) -> bool:
+        ...
+    @property
+    def saturated(self) -> bool:
+        ...
+    @property
+    def slew_limited(self) -> bool:
+        ...
+    @property
+    def soft_limit(self) -> bool:
+        ...
+    @property
+    def tau_actuation_nm(self) -> numpy.ndarray:
+        """
+        NaN unless ACTIVE
+        """
+    @property
+    def tick(self) -> int:
+        ...
+    @property
+    def time_us(self) -> int:
+        ...
+    @property
+    def u(self) -> numpy.ndarray:
+        ...
+    @property
+    def u_ref(self) -> numpy.ndarray:
+        """
+        NaN unless ACTIVE
+        """
+    @property
+    def velocity(self) -> numpy.ndarray:
+        ...
+class PlantState:
+    """
+    The true state of a simulated arm.
+    """
+    @property
+    def pressure_bar(self) -> numpy.ndarray:
+        ...
+    @property
+    def time_us(self) -> int:
+        ...
+    @property
+    def tip_m(self) -> numpy.ndarray:
+        ...
+    @property
+    def u(self) -> numpy.ndarray:
+        ...
+    @property
+    def velocity(self) -> numpy.ndarray:
+        ...
+    @property
+    def vented(self) -> bool:
+        ...
+class TransportError(RuntimeError):
+    pass
+class ArmClient:
+    """
+    A running arm, real or simulated: status, requests, references, chamber commands.
+    
+    Messages are handled in update, wait_for_status and request only. For one thread at a time.
+    """
+    def __init__(self, experiment: Experiment) -> None:
+        ...
+    def command_chambers(self, pressure_bar: numpy.ndarray) -> None:
+        """
+        Move the set points towards these (bar, one a chamber) within the experiment's limits and
+        send them when due. The valves vent by themselves when calls stop.
+        """
+    def lock_commands(self) -> None:
+        """
+        Take softarmd's place on this machine. RuntimeError while another program has it.
+        """
+    def record(self, log: os.PathLike) -> None:
+        """
+        Write every message to an LCM event log from now on.
+        """
+    def request(self, what: str, patience_s: float = 2.0) -> str:
+        """
+        'arm', 'disarm' or 'emergency_stop', until a status shows it: 'done', 'refused' (the
+        daemon reports otherwise) or 'unheard' (no daemon reports).
+        """
+    def send_go(self, go: bool) -> None:
+        """
+        The dead-man input, held or released.
+        """
+    def send_reference(self, u: numpy.ndarray, velocity: numpy.ndarray, acceleration: numpy.ndarray) -> None:
+        """
+        u, u', u'' (2n each; rad, rad/s, rad/s^2) for a daemon whose phase is `live`.
+        """
+    def stop_recording(self) -> None:
+        ...
+    def update(self, patience_s: float = 0.0) -> bool:
+        """
+        Wait for a message for at most patience_s and handle all that have arrived; whether any did.
+        """
+    def vent_to_rest(self) -> None:
+        """
+        Vent completely; blocks.
+        """
+    def wait_for_status(self, patience_s: float) -> bool:
+        """
+        Handle messages until the next status; False if none comes within patience_s.
+        """
+    @property
+    def measured_bar(self) -> numpy.ndarray | None:
+        """
+        pressures measured by the valves, bar; None before the first
+        """
+    @property
+    def other_commander(self) -> str:
+        ...
+    @property
+    def plant(self) -> PlantState | None:
+        ...
+    @property
+    def seen_u(self) -> numpy.ndarray:
+        """
+        u in the newest motion-capture frame that showed every segment; empty before the first
+        """
+    @property
+    def status(self) -> Status | None:
         ...
 def advance(plants: list[Plant], duration_s: float, commands_bar: numpy.ndarray, threads: int = 0) -> None:
     """

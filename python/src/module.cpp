@@ -68,6 +68,14 @@ PYBIND11_MODULE(_core, module) {
           "of noise and dropouts of the simulated arm")
       .def_readonly("rate_hz", &Experiment::rate_hz, "of the control tick, Hz")
       .def_property_readonly("segments", [](const Experiment& e) { return e.arm.size(); })
+      .def_property_readonly(
+          "chambers",
+          [](const Experiment& e) {
+            std::vector<std::size_t> counts;
+            for (const auto& segment : e.actuation.segments) counts.push_back(segment.size());
+            return counts;
+          },
+          "number of chambers of every segment")
       .def_property_readonly("duration_s", [](const Experiment& e) { return e.run.duration_s; })
       .def_property_readonly(
           "pressure_limits_bar",
@@ -96,4 +104,5 @@ PYBIND11_MODULE(_core, module) {
   bind_model(module);
   bind_control(module);
   bind_simulation(module);
+  bind_client(module);
 }
