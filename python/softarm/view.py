@@ -237,7 +237,7 @@ def main(config, log, host, port, control):
         return 78
     except (OSError, ValueError, subprocess.CalledProcessError, softarm.TransportError) as error:
         print(f"softarm view: {error}", file=sys.stderr)
-        return 74
+        return 1
     print(f"softarm view: http://{host}:{view.server.get_port()} (Ctrl-C ends it)", flush=True)
     try:
         if pictures:
