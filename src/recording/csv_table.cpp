@@ -15,7 +15,7 @@ namespace {
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
 /// Qualisys writes matrices column by column. The element of row 1 and column 3 is the sine of the
-/// pitch in the third column before them: this tells whether a version did otherwise.
+/// pitch in the third column before them: this shows whether a version did otherwise.
 Eigen::Matrix3d matrix_of(const std::vector<double>& row, std::size_t first) {
   Eigen::Matrix3d R = Eigen::Map<const Eigen::Matrix3d>(row.data() + first);
   if (first < 3) return R;
@@ -42,7 +42,7 @@ Eigen::Vector4d quaternion_of(const WrittenBody& body, const std::vector<double>
   return Eigen::Quaterniond(R).coeffs();
 }
 
-/// Columns of our own behind those of the file: quaternions, and a time that counts frames.
+/// Columns behind those of the file: quaternions, and a time that counts frames.
 void add_derived(CsvTable& table, const TableHeader& header) {
   for (const WrittenBody& body : header.bodies) {
     TableBody found{body.name, {body.position, body.position + 1, body.position + 2}, {}};

@@ -34,9 +34,9 @@ SummaryFiles::SummaryFiles(const std::filesystem::path& folder, const Experiment
                            const Files& inputs)
     : summary_(made(folder) / "summary.json", inputs_of(experiment, inputs)),
       timing_(folder / "timing.json", inputs_of(experiment, inputs)) {
-  constexpr std::size_t kRoom = 64 * 1024;
-  summary_.reserve(kRoom);
-  timing_.reserve(kRoom);
+  constexpr std::size_t kReserved = 64 * 1024;
+  summary_.reserve(kReserved);
+  timing_.reserve(kReserved);
 }
 
 void SummaryFiles::write(const std::string& summary, const std::string& timing) {

@@ -108,10 +108,9 @@ class Proposal {
       if (at == table_.columns.size())
         throw std::runtime_error(
             fmt::format("{}: expected a column of times, got none that is named so", table_.file));
-      time_name_ = {
-          "\"" + (plain(table_.columns[at]) ? table_.columns[at] : fmt::format("#{}", at + 1)) +
-              "\"",
-          "by its name, or because it rises"};
+      const std::string& named = table_.columns[at];
+      time_name_ = {plain(named) ? fmt::format("\"{}\"", named) : fmt::format("\"#{}\"", at + 1),
+                    "by its name, or because it rises"};
     }
     time_ = at;
     const std::string name = lower(table_.columns[at]);
@@ -129,10 +128,10 @@ class Proposal {
     if (has(name, {"_us", "usec", "micro"})) return choose(1e-6, "by the name of the column");
     if (has(name, {"_ns", "nsec", "nano"})) return choose(1e-9, "by the name of the column");
     const auto rows = fmt::format("rows are {:.4g} apart", step);
-    if (step >= 1e5) return choose(1e-9, rows + ": nanoseconds");
-    if (step >= 200.0) return choose(1e-6, rows + ": microseconds");
-    if (step >= 0.5) return choose(1e-3, rows + ": milliseconds");
-    choose(1.0, rows + ": seconds");
+    if (step >= 1e5) return choose(1e-9, fmt::format("{}: nanoseconds", rows));
+    if (step >= 200.0) return choose(1e-6, fmt::format("{}: microseconds", rows));
+    if (step >= 0.5) return choose(1e-3, fmt::format("{}: milliseconds", rows));
+    choose(1.0, fmt::format("{}: seconds", rows));
   }
 
   bool rises(std::size_t column) const {
@@ -181,8 +180,8 @@ class Proposal {
       if (unit_quaternion(behind)) q = behind;
       if (k >= 4 && unit_quaternion(k - 4) && !taken(k - 4)) q = k - 4;
       if (q == table_.columns.size()) continue;
-      std::string name = table_.columns[k];
-      name.resize(lower(name).find_last_of('x'));
+      const std::string name =
+          table_.columns[k].substr(0, lower(table_.columns[k]).find_last_of('x'));
       bodies_.push_back({name, {k, k + 1, k + 2}, {q, q + 1, q + 2, q + 3}});
     }
   }
@@ -336,7 +335,7 @@ class Proposal {
   /// A column as a map names it: by its number where the name would need quotes within quotes.
   std::string column(std::size_t k) const {
     const std::string& name = table_.columns[k];
-    return plain(name) ? "'" + name + "'" : fmt::format("'#{}'", k + 1);
+    return plain(name) ? fmt::format("'{}'", name) : fmt::format("'#{}'", k + 1);
   }
   static bool plain(const std::string& name) {
     return name.size() <= 100 && std::all_of(name.begin(), name.end(), [](char c) {
@@ -352,7 +351,8 @@ class Proposal {
     if (named_ && plain_bodies()) return fmt::format("body: \"{}\"", bodies_[body].name);
     const auto list = [&](const auto& columns) {
       std::string text;
-      for (const std::size_t k : columns) text += (text.empty() ? "" : " ") + column(k);
+      for (const std::size_t k : columns)
+        text += fmt::format("{}{}", text.empty() ? "" : " ", column(k));
       return text;
     };
     return fmt::format("position: \"{}\", orientation: \"{}\"", list(bodies_[body].position),
@@ -379,7 +379,7 @@ class Proposal {
       if (!numbered && !has(name, {"press", "bar", "kpa", "psi", "valve"})) continue;
       std::string& list =
           has(name, {"set", "cmd", "command", "ref", "des", "goal"}) ? commanded : measured;
-      list += (list.empty() ? "" : " ") + column(k);
+      list += fmt::format("{}{}", list.empty() ? "" : " ", column(k));
       for (const char* unit : {"mbar", "kpa", "psi", "bar"})
         if (unit_name.empty() && has(name, {unit})) unit_name = unit;
       for (const std::size_t row : rows_)

@@ -42,7 +42,7 @@ class OutputFile {
   OutputFile(const OutputFile&) = delete;
   OutputFile& operator=(const OutputFile&) = delete;
 
-  /// Claims room on the disk, where the file system can, so that this much can be written later.
+  /// Claims space on the disk, where the file system can, so that this much can be written later.
   void reserve(std::size_t bytes);
 
   /// Appends. Where a record cannot be written (a full disk), the file keeps all whole ones before.

@@ -38,7 +38,7 @@ class ExperimentLog {
   std::string line_;
 };
 
-/// summary.json and timing.json of a run. Opened before it, with room for them: a disk that fills
+/// summary.json and timing.json of a run. Opened before it, with space for them: a disk that fills
 /// up meanwhile does not take them.
 class SummaryFiles {
  public:
