@@ -19,7 +19,8 @@ void draw_plots(const std::string& folder) {
                      waitpid(child, &status, 0) == child && status == 0;
   if (!drawn)
     print_error("softarm",
-                "no plots: is python3-matplotlib installed? Use --no-plots to do without");
+                "no plots, for the reason above (is python3-matplotlib installed?); --no-plots does "
+                "without");
 }
 
 }  // namespace softarm
