@@ -75,6 +75,8 @@ constexpr std::array kCauses{
           [](const Evidence& e) { return e.frame_age_ns > e.thresholds.vent_after_ns; }},
     Cause{{Reason::soft_limit, Mode::vent, Clearance::arm},
           [](const Evidence& e) { return e.input.soft_limit_exceeded; }},
+    Cause{{Reason::oscillation, Mode::vent, Clearance::arm},
+          [](const Evidence& e) { return e.input.oscillation; }},
     Cause{{Reason::many_overruns, Mode::vent, Clearance::good_frames},
           [](const Evidence& e) {
             return e.settings.vent_overruns > 0 &&
@@ -133,7 +135,8 @@ const char* name(Reason reason) noexcept {
                               "deadman_released",
                               "pressure_mismatch",
                               "curvature_mismatch",
-                              "command_expired"};
+                              "command_expired",
+                              "oscillation"};
   static_assert(kNames.size() == static_cast<std::size_t>(kReasons));
   return name_of(reason, kNames);
 }

@@ -115,6 +115,8 @@ const std::vector<Row>& rows() {
       {Reason::soft_limit, Mode::vent, Clearance::arm, false, 1,
        [](Bench& b) { b.input.soft_limit_exceeded = true; },
        [](Bench& b) { b.input.soft_limit_exceeded = false; }},
+      {Reason::oscillation, Mode::vent, Clearance::arm, false, 1,
+       [](Bench& b) { b.input.oscillation = true; }, [](Bench& b) { b.input.oscillation = false; }},
       {Reason::many_overruns, Mode::vent, Clearance::good_frames, false, 1,
        [](Bench& b) { b.input.consecutive_overruns = 10; },
        [](Bench& b) { b.input.consecutive_overruns = 0; }},
