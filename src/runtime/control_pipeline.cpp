@@ -43,6 +43,7 @@ ControlPipeline::ControlPipeline(const PipelineSettings& settings)
       ramps_(settings.actuation),
       pressure_watch_(settings.safety, allocator_.chambers()),
       curvature_watch_(settings.safety, settings.arm),
+      oscillation_watch_(settings.safety, period_s_, settings.arm.dof()),
       previous_bar_(PressureVector::Zero(allocator_.chambers())),
       previous_tau_nm_(SegmentVector::Zero(settings.arm.dof())),
       commanded_tau_nm_(previous_tau_nm_),
@@ -80,6 +81,9 @@ const TickOutput& ControlPipeline::tick(const TickInput& input) noexcept {
   if (mode == Mode::active) {
     reference_.advance(seconds(act_ns));
     control(act_ns);
+    oscillation_watch_.judge(window_.now.u, output_.motion.u_rad);
+  } else {
+    oscillation_watch_.reset();
   }
   limit(mode);
   if (observer_) {
@@ -164,6 +168,7 @@ void ControlPipeline::validate_and_estimate(const TickInput& input, SafetyInput&
 void ControlPipeline::watch(const TickInput& input, SafetyInput& safety) noexcept {
   if (input.measured_bar != nullptr && input.measured_bar->size() == previous_bar_.size())
     pressure_watch_.measure(*input.measured_bar);
+  safety.oscillation = oscillation_watch_.oscillates();
   safety.pressure_mismatch = settings_.safety.valve_readback && pressure_watch_.out_of_tolerance();
   if (!curvature_watch_.used()) return;
   // What is judged is the balance of an arm that is observed and commanded.

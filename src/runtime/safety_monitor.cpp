@@ -64,6 +64,8 @@ constexpr std::array kCauses{
           }},
     Cause{{Reason::soft_limit, Mode::vent, Clearance::arm},
           [](const Evidence& e) { return e.input.soft_limit_exceeded; }},
+    Cause{{Reason::oscillation, Mode::vent, Clearance::arm},
+          [](const Evidence& e) { return e.input.oscillation; }},
     Cause{{Reason::valves_silent, Mode::vent, Clearance::good_frames},
           [](const Evidence& e) { return e.valves_silent(); }},
     Cause{{Reason::pressure_mismatch, Mode::vent, Clearance::good_frames},
@@ -134,7 +136,8 @@ const char* name(Reason reason) noexcept {
                               "deadman_released",
                               "pressure_mismatch",
                               "curvature_mismatch",
-                              "command_expired"};
+                              "command_expired",
+                              "oscillation"};
   static_assert(kNames.size() == static_cast<std::size_t>(kReasons));
   return name_of(reason, kNames);
 }

@@ -126,6 +126,7 @@ class ControlPipeline {
   PressureRamps ramps_;
   PressureWatch pressure_watch_;
   CurvatureWatch curvature_watch_;
+  OscillationWatch oscillation_watch_;
 
   TickOutput output_;
   ReferenceWindow window_;

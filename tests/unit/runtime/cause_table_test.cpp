@@ -106,6 +106,8 @@ const std::vector<Row>& rows() {
       {Reason::soft_limit, Mode::vent, Clearance::arm, false, 1,
        [](Bench& b) { b.input.soft_limit_exceeded = true; },
        [](Bench& b) { b.input.soft_limit_exceeded = false; }},
+      {Reason::oscillation, Mode::vent, Clearance::arm, false, 1,
+       [](Bench& b) { b.input.oscillation = true; }, [](Bench& b) { b.input.oscillation = false; }},
       {Reason::time_gap, Mode::vent, Clearance::good_frames, false, 1,
        [](Bench& b) { b.gap_ns = 150 * kMs; }, nothing},
       {Reason::command_expired, Mode::vent, Clearance::good_frames, false, 1,

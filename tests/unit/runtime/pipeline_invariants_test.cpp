@@ -124,7 +124,9 @@ TEST(PipelineInvariants, HoldInEveryTickOfRandomSequences) {
             (std::set{Mode::wait_frames, Mode::active, Mode::hold, Mode::vent, Mode::fault}));
   for (const CauseRule& rule : cause_table()) {
     // An ideal arm is always where it should be.
-    if (rule.reason == Reason::soft_limit || rule.reason == Reason::curvature_mismatch) continue;
+    if (rule.reason == Reason::soft_limit || rule.reason == Reason::curvature_mismatch ||
+        rule.reason == Reason::oscillation)
+      continue;
     EXPECT_EQ(reasons.count(rule.reason), 1u) << name(rule.reason) << " never came up";
   }
 }
