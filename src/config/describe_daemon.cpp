@@ -49,6 +49,11 @@ static void describe(Keys& key, SafetySettings& it) {
   KEY(curvature_residual_nm, from(0, 1e4),
       "|K u + G - A tau_A| of a segment above it: FAULT; 0: not checked");
   KEY(curvature_settling_s, above(0, 100), "for so long without interruption");
+  KEY(length_warning, from(0, 100),
+      "a segment's measured length off arm.length_m by more, over that: the status reports it; 0: "
+      "not checked");
+  KEY(length_fault, from(0, 100), "the same: FAULT; 0: not checked");
+  KEY(length_settling_s, above(0, 100), "for so long without interruption");
   KEY(deadman_timeout_s, above(0, 10), "without a go on lcm.deadman_channel: VENT");
 }
 

@@ -43,9 +43,10 @@ enum class Reason : std::int8_t {
   deadman_released,
   pressure_mismatch,
   curvature_mismatch,
-  command_expired
+  command_expired,
+  length_mismatch
 };
-inline constexpr int kReasons = static_cast<int>(Reason::command_expired) + 1;
+inline constexpr int kReasons = static_cast<int>(Reason::length_mismatch) + 1;
 
 /// As above, in static storage; "unknown" for a value outside the enumeration.
 const char* name(Mode mode) noexcept;
@@ -105,6 +106,7 @@ struct SafetyInput {
   std::int64_t newest_measurement_ns = kNever;  ///< of the valves' read-back
   bool pressure_mismatch = false;               ///< measured pressures do not follow the commands
   bool curvature_mismatch = false;              ///< the arm is not where its pressures would put it
+  bool length_mismatch = false;                 ///< the arm is not as long as configured
   bool command_expired = false;        ///< the last command expired: the valves have vented
   bool deadman_used = false;           ///< there is a dead-man input
   std::int64_t newest_go_ns = kNever;  ///< arrival of the newest "go"
