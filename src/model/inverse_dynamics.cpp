@@ -5,7 +5,7 @@
 // unequal segments keep their digits. Outward, the second derivative of the frames along a and b is
 // carried: D_a D_b R = M R with M = [alpha]x + ([w_a]x [w_b]x + [w_b]x [w_a]x) / 2. What B adds,
 // the first derivative along x, enters the same two places, and gravity is an acceleration of the
-// base. What a segment does within its own frame waits for nobody: four segments at a time
+// base. What a segment does within its own frame depends on no other: four segments at a time
 // (segment_lanes.hpp).
 //
 // A segment that stretches is r = l f(u): with strain rates e_a = a_e / l and so on, D_a r is

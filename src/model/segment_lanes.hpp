@@ -1,5 +1,5 @@
 // Four neighbouring segments side by side, one lane a segment: what does not depend on how their
-// frames move waits for nobody and is done for all four at once.
+// frames move is computed for all four at once.
 #pragma once
 
 #include "model/arc_moments.hpp"

@@ -8,7 +8,7 @@
 
 namespace softarm {
 
-/// A of one segment, 2 x 2. `couple`: (15) with its transpose mended, det = c1 = sin theta / theta,
+/// A of one segment, 2 x 2. `couple`: (15), transpose corrected, det = c1 = sin theta / theta,
 /// singular at theta = pi. `chamber`: [[0, 1], [-1, 0]] everywhere.
 Eigen::Matrix2d actuation_matrix(ActuationModel model, const Eigen::Vector2d& u_rad) noexcept;
 

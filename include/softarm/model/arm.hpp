@@ -1,4 +1,4 @@
-// The constant description of a soft arm and the vector types every room shares.
+// The constant description of a soft arm and the vector types that every module shares.
 #pragma once
 
 #include <Eigen/Core>
@@ -41,9 +41,9 @@ struct SegmentParameters {
 /// rotational inertia); `distributed` spreads it homogeneously along the arc.
 enum class MassModel { point, distributed };
 
-/// Which input matrix A maps tau_A to generalized forces: `couple` is the paper's (15) with its
-/// transpose mended (singular at theta = pi), `chamber` the body-following moment of chambers and
-/// tendons (never singular).
+/// Which input matrix A maps tau_A to generalized forces: `couple` is the paper's (15),
+/// transpose corrected (singular at theta = pi); `chamber` the body-following moment of chambers
+/// and tendons (never singular).
 enum class ActuationModel { chamber, couple };
 
 /// An arm of n segments hanging from, or standing on, a base frame S_0. The straight arm points

@@ -4,7 +4,7 @@
 // The size of a term is the sum of the magnitudes that the masses contribute (Cauchy's inequality
 // over the masses): s_i s_j for B, s_i (r_j + s_j |u'|) for C, s_i sqrt(mass) |g| for G, and their
 // sums for the recursion; s_i = sqrt(sum mu |J_i|^2), r_j = sqrt(sum mu |J_j-dot|^2). What is small
-// against it is the difference of larger contributions, and a relative error of its own is more
+// against it is the difference of larger contributions, and an error relative to itself is more
 // than the rounding of u itself leaves. Positions and Jacobians count against the arm's length.
 #pragma once
 

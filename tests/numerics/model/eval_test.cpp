@@ -6,6 +6,7 @@
 #include <string>
 
 #include "program_output.hpp"
+#include "test_folder.hpp"
 #include "unit/model/extensible_golden.hpp"
 
 namespace softarm {
@@ -130,18 +131,13 @@ TEST(Eval, ArmsThatStretchWithDistributedMass) { compare_extensible("distributed
 
 class EvalFile : public ::testing::Test {
  protected:
-  void SetUp() override {
-    path_ = ::testing::TempDir() + "softarm_eval_" +
-            ::testing::UnitTest::GetInstance()->current_test_info()->name() + ".yaml";
-  }
-  void TearDown() override { std::remove(path_.c_str()); }
-
   Outcome eval(const std::string& text, const std::string& options = "") {
     std::ofstream(path_) << text;
     return run(path_ + " " + options);
   }
 
-  std::string path_;
+  const TestFolder folder_;
+  const std::string path_ = (folder_ / "cases.yaml").string();
   const std::string arm_ =
       "  config: {n: 1, coords: cartesian_u, gravity: [0, 0, -9.81],\n"
       "    base_rotation: [[1, 0, 0], [0, -1, 0], [0, 0, -1]], base_position: [0, 0, 0],\n"
@@ -167,7 +163,7 @@ TEST_F(EvalFile, NotFiniteIsNull) {
   EXPECT_TRUE(one["K"].IsSequence());
 }
 
-TEST_F(EvalFile, FaultsAreToldWithTheirPlace) {
+TEST_F(EvalFile, FaultsAreReportedWithTheirPlace) {
   const auto expect = [](const Outcome& outcome, const std::string& part) {
     EXPECT_EQ(outcome.code, 78) << outcome.text;
     EXPECT_NE(outcome.text.find(part), std::string::npos) << outcome.text;

@@ -10,7 +10,7 @@
 namespace softarm {
 namespace {
 
-/// Beyond this KDL's O(n^2) matrices take a tenth of a second a call and say nothing new.
+/// Beyond this KDL's O(n^2) matrices take a tenth of a second a call and add no information.
 constexpr int kKdlMatricesUpTo = 50;
 
 class Augmented : public Evaluator {

@@ -163,8 +163,7 @@ class SegmentMasses {
     // The first x of an arc is an arc of length x l bent by x u.
     const Piece p = piece(x * s.length, x * s.ux, x * s.uy);
     if (radius == 0) {
-      add(m, mass, p.tip,
-          {x * p.tip_column[0], x * p.tip_column[1], x * p.tip_column[2]});
+      add(m, mass, p.tip, {x * p.tip_column[0], x * p.tip_column[1], x * p.tip_column[2]});
       return;
     }
     const Real ring = radius / std::sqrt(Real(2));
