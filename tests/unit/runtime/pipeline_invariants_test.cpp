@@ -244,7 +244,7 @@ TEST_F(Watches, ALengthThatIsNotConfiguredIsReportedThenAFault) {
     SCOPED_TRACE(factor);
     PipelineBench bench(experiment);
     bend(bench);
-    bench.spoil = [&](MocapFrame& frame) {
+    bench.corrupt = [&](MocapFrame& frame) {
       lengthen(frame, factor);
       return true;
     };
@@ -258,7 +258,7 @@ TEST_F(Watches, ALengthThatIsNotConfiguredIsReportedThenAFault) {
     if (off > 0.1) {
       EXPECT_EQ(bench.pipeline.output().reason, Reason::length_mismatch);
     }
-    bench.spoil = nullptr;
+    bench.corrupt = nullptr;
     bench.run(500);
     EXPECT_FALSE(bench.pipeline.output().length_warning);
     EXPECT_EQ(bench.pipeline.output().mode, off > 0.1 ? Mode::fault : Mode::active);
@@ -268,7 +268,7 @@ TEST_F(Watches, ALengthThatIsNotConfiguredIsReportedThenAFault) {
 TEST_F(Watches, AnArmOfAnotherLengthDoesNotBecomeActive) {
   PipelineBench bench(experiment);
   double factor = 1.15;
-  bench.spoil = [&](MocapFrame& frame) {
+  bench.corrupt = [&](MocapFrame& frame) {
     lengthen(frame, factor);
     return true;
   };
@@ -281,7 +281,7 @@ TEST_F(Watches, AnArmOfAnotherLengthDoesNotBecomeActive) {
   experiment.safety.length_fault = 0.0;
   PipelineBench unchecked(experiment);
   factor = 1.15;
-  unchecked.spoil = bench.spoil;
+  unchecked.corrupt = bench.corrupt;
   EXPECT_GT(unchecked.run_to(Mode::active), 0);
   unchecked.run(1000);
   EXPECT_EQ(unchecked.pipeline.output().mode, Mode::active);
