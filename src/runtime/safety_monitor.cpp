@@ -43,7 +43,7 @@ struct Cause {
 /// demand, then by what clears them: of two causes at once the stricter clearance must not be
 /// forgotten. Valves that are silent or do not follow are a fault where there is pressure; where there
 /// is none they only keep the arm from becoming active, so that valves may be switched on after the
-/// daemon. Overruns are ticks missed in a row, and judged only under SCHED_FIFO
+/// daemon. So is an arm of another length, whose marker frames may still be put right. Overruns are ticks missed in a row, and judged only under SCHED_FIFO
 /// (consecutive_overruns is zero otherwise): without it they are only counted.
 constexpr std::array kCauses{
     Cause{{Reason::shutdown, Mode::vent, Clearance::never},
@@ -56,6 +56,8 @@ constexpr std::array kCauses{
           [](const Evidence& e) { return e.input.pressure_mismatch && e.pressurised(); }},
     Cause{{Reason::curvature_mismatch, Mode::fault, Clearance::disarm_then_arm},
           [](const Evidence& e) { return e.input.curvature_mismatch; }},
+    Cause{{Reason::length_mismatch, Mode::fault, Clearance::disarm_then_arm},
+          [](const Evidence& e) { return e.input.length_mismatch && e.pressurised(); }},
     Cause{{Reason::disarmed, Mode::vent, Clearance::arm},
           [](const Evidence& e) { return e.input.requests.disarm; }},
     Cause{{Reason::deadman_released, Mode::vent, Clearance::arm},
@@ -70,6 +72,8 @@ constexpr std::array kCauses{
           [](const Evidence& e) { return e.valves_silent(); }},
     Cause{{Reason::pressure_mismatch, Mode::vent, Clearance::good_frames},
           [](const Evidence& e) { return e.input.pressure_mismatch; }},
+    Cause{{Reason::length_mismatch, Mode::vent, Clearance::good_frames},
+          [](const Evidence& e) { return e.input.length_mismatch; }},
     Cause{{Reason::time_gap, Mode::vent, Clearance::good_frames},
           [](const Evidence& e) { return e.tick_gap_ns > e.thresholds.vent_after_ns; }},
     Cause{{Reason::command_expired, Mode::vent, Clearance::good_frames},
@@ -137,7 +141,8 @@ const char* name(Reason reason) noexcept {
                               "pressure_mismatch",
                               "curvature_mismatch",
                               "command_expired",
-                              "oscillation"};
+                              "oscillation",
+                              "length_mismatch"};
   static_assert(kNames.size() == static_cast<std::size_t>(kReasons));
   return name_of(reason, kNames);
 }

@@ -44,9 +44,10 @@ enum class Reason : std::int8_t {
   pressure_mismatch,
   curvature_mismatch,
   command_expired,
-  oscillation
+  oscillation,
+  length_mismatch
 };
-inline constexpr int kReasons = static_cast<int>(Reason::oscillation) + 1;
+inline constexpr int kReasons = static_cast<int>(Reason::length_mismatch) + 1;
 
 /// As above, in static storage; "unknown" for a value outside the enumeration.
 const char* name(Mode mode) noexcept;
@@ -107,6 +108,7 @@ struct SafetyInput {
   bool pressure_mismatch = false;               ///< measured pressures do not follow the commands
   bool curvature_mismatch = false;              ///< the arm is not where its pressures would put it
   bool oscillation = false;            ///< the arm swings about its reference and does not stop
+  bool length_mismatch = false;        ///< the arm is not as long as configured
   bool command_expired = false;        ///< the last command expired: the valves have vented
   bool deadman_used = false;           ///< there is a dead-man input
   std::int64_t newest_go_ns = kNever;  ///< arrival of the newest "go"
