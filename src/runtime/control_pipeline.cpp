@@ -160,6 +160,7 @@ void ControlPipeline::validate_and_estimate(const TickInput& input, SafetyInput&
   safety.newest_measurement_ns = input.newest_measurement_ns;
   safety.deadman_used = settings_.safety.deadman;
   safety.newest_go_ns = input.newest_go_ns;
+  safety.newest_foreign_ns = input.newest_foreign_ns;
   safety.requests = input.requests;
   output_.soft_limit = safety.soft_limit_exceeded;
   output_.frame_age_s = newest_capture_ns_ == kNever

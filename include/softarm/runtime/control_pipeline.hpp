@@ -45,6 +45,8 @@ struct TickInput {
   const PressureVector* measured_bar = nullptr;
   /// Arrival of the newest "go", where there is a dead-man input.
   std::int64_t newest_go_ns = kNever;
+  /// Arrival of the newest set points on our command channel that another program sent.
+  std::int64_t newest_foreign_ns = kNever;
 };
 
 /// What the tick saw, decided and commands.
