@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <regex>
 
+#include "faults/preloaded_clocks.hpp"
 #include "integration/valves/relay.hpp"
 #include "integration/valves/valves_program.hpp"
 
@@ -179,6 +180,54 @@ TEST_F(ValvesBehindARelay, AStoppedAndContinuedDriverVents) {
       << driver_->printed();
   expect_recovery();
 }
+
+#ifndef SOFTARM_SANITIZED  // a sanitizer's runtime must be loaded first
+/// The same driver on clocks that the test sets.
+class ValvesOnPausedMachines : public ValvesBehindARelay {
+ protected:
+  void begin_on_set_clocks() {
+    clocks_ = std::make_unique<test::PreloadedClocks>((folder_ / "clocks").string());
+    ASSERT_TRUE(clocks_->made());
+    begin();
+    driver_.reset();
+    std::vector<std::string> arguments = clocks_->preload();
+    arguments.push_back(std::string(SOFTARM_BINARY_DIR) + "/bin/softarm-valves");
+    driver_ = start("/env", arguments);
+    ASSERT_TRUE(run_at(0.3)) << driver_->printed();
+  }
+  std::unique_ptr<test::PreloadedClocks> clocks_;
+};
+
+TEST_F(ValvesOnPausedMachines, ASuspendVents) {
+  begin_on_set_clocks();
+  clocks_->suspend(5 * test::kSecond);
+  EXPECT_TRUE(wait_for([&] { return is(ValveState::degraded, ValveReason::time_gap); }, 0.3))
+      << driver_->printed();
+  EXPECT_TRUE(wait_for([&] { return plant_.pressure_bar[0] < 0.02F; }, 0.3));
+  expect_recovery();
+}
+
+// The terminal has vented by itself meanwhile. What it holds is read before it is written again.
+TEST_F(ValvesOnPausedMachines, APauseThatNoClockCountsVentsToo) {
+  begin_on_set_clocks();
+  const std::int64_t stopped_ns = monotonic_now_ns();
+  driver_->stop();
+  ASSERT_TRUE(wait_for([&] { return plant_.vented != 0 && plant_.pressure_bar[0] < 0.02F; }, 0.3));
+  clocks_->lose(monotonic_now_ns() - stopped_ns);
+  float highest_bar = 0.0F;
+  const int before = statuses_;
+  driver_->signal(SIGCONT);
+  EXPECT_TRUE(wait_for(
+      [&] {
+        highest_bar = std::max(highest_bar, plant_.pressure_bar[0]);
+        return statuses_ > before && is(ValveState::degraded, ValveReason::echo_mismatch);
+      },
+      0.3))
+      << driver_->printed();
+  EXPECT_LT(highest_bar, 0.05F) << "it is not filled again";
+  expect_recovery();
+}
+#endif
 
 TEST_F(ValvesBehindARelay, WithExplicitArmingCommandsOfZeroComeFirst) {
   begin("", ", arming: explicit");
