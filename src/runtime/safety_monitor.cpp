@@ -40,7 +40,8 @@ struct Cause {
 };
 
 /// Every cause, the most severe first: `shutdown` because it is final, then by the mode they
-/// demand. Valves that are silent or do not follow are a fault where there is pressure; where there
+/// demand, then by what clears them: of two causes at once the stricter clearance must not be
+/// forgotten. Valves that are silent or do not follow are a fault where there is pressure; where there
 /// is none they only keep the arm from becoming active, so that valves may be switched on after the
 /// daemon. Overruns are ticks missed in a row, and judged only under SCHED_FIFO
 /// (consecutive_overruns is zero otherwise): without it they are only counted.
@@ -61,6 +62,8 @@ constexpr std::array kCauses{
           [](const Evidence& e) {
             return e.input.deadman_used && e.go_age_ns > e.thresholds.deadman_timeout_ns;
           }},
+    Cause{{Reason::soft_limit, Mode::vent, Clearance::arm},
+          [](const Evidence& e) { return e.input.soft_limit_exceeded; }},
     Cause{{Reason::valves_silent, Mode::vent, Clearance::good_frames},
           [](const Evidence& e) { return e.valves_silent(); }},
     Cause{{Reason::pressure_mismatch, Mode::vent, Clearance::good_frames},
@@ -75,8 +78,6 @@ constexpr std::array kCauses{
           [](const Evidence& e) { return e.input.sender_restarted; }},
     Cause{{Reason::frames_stale, Mode::vent, Clearance::good_frames},
           [](const Evidence& e) { return e.frame_age_ns > e.thresholds.vent_after_ns; }},
-    Cause{{Reason::soft_limit, Mode::vent, Clearance::arm},
-          [](const Evidence& e) { return e.input.soft_limit_exceeded; }},
     Cause{{Reason::many_overruns, Mode::vent, Clearance::good_frames},
           [](const Evidence& e) {
             return e.settings.vent_overruns > 0 &&

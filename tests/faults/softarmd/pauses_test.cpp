@@ -22,16 +22,17 @@ TEST_P(Pauses, ASuspendedDaemonVentsAndWithExplicitArmingWaitsForAPerson) {
   const auto daemon = start("/env", arguments);
   ASSERT_TRUE(wait_for([&] { return reason() == Reason::waiting_for_arm; })) << daemon->printed();
   EXPECT_EQ(client_->request(OperatorRequest::arm), RequestOutcome::done) << daemon->printed();
-  ASSERT_TRUE(wait_for([&] { return under_pressure(); })) << told() << daemon->printed();
+  ASSERT_TRUE(wait_for([&] { return under_pressure(); })) << seen_text() << daemon->printed();
 
   forget();
   clocks.suspend(30 * test::kSecond);
-  EXPECT_TRUE(wait_for([&] { return saw(Mode::vent, Reason::time_gap); })) << told();
-  EXPECT_TRUE(becomes(*this, Mode::vent, Reason::waiting_for_arm)) << told() << daemon->printed();
+  EXPECT_TRUE(wait_for([&] { return saw(Mode::vent, Reason::time_gap); })) << seen_text();
+  EXPECT_TRUE(becomes(*this, Mode::vent, Reason::waiting_for_arm))
+      << seen_text() << daemon->printed();
   EXPECT_EQ(largest(command_.pressure_bar), 0.0);
-  EXPECT_FALSE(saw(Mode::fault, Reason::valves_silent)) << told();
+  EXPECT_FALSE(saw(Mode::fault, Reason::valves_silent)) << seen_text();
   EXPECT_EQ(client_->request(OperatorRequest::arm), RequestOutcome::done) << daemon->printed();
-  EXPECT_TRUE(wait_for([&] { return under_pressure(); })) << told();
+  EXPECT_TRUE(wait_for([&] { return under_pressure(); })) << seen_text();
 }
 
 SOFTARM_ON_BOTH_MACHINES(Pauses);

@@ -13,7 +13,6 @@
 namespace softarm {
 namespace {
 
-using namespace std::chrono_literals;
 using test::BadTerminal;
 using test::kChambers;
 using test::Process;
@@ -23,16 +22,14 @@ using test::Writes;
 class ValvesAtABadTerminal : public ValvesProgram {
  protected:
   void begin(const std::string& valves = "") {
-    write_config(terminal_.port(), valves);
+    configure(terminal_.port(), valves);
     driver_ = start("softarm-valves");
   }
   bool run_at(double bar) {
-    return wait_for(
-        [&] {
-          return is(ValveState::running, ValveReason::none) &&
-                 std::abs(terminal_.pressure_bar() - bar) < 0.02;
-        },
-        bar);
+    return command_until(bar, [&] {
+      return is(ValveState::running, ValveReason::none) &&
+             std::abs(terminal_.pressure_bar() - bar) < 0.02;
+    });
   }
   bool vented() const { return terminal_.pressure_bar() < 0.02; }
   /// The driver has a cycle every 50 ms and the terminal a time-out of 0.3 s; every cycle is two
@@ -49,16 +46,17 @@ TEST_F(ValvesAtABadTerminal, RefusedWritesAreFollowedBySilenceAndTheTerminalVent
   terminal_.requests = 0;
   terminal_.writes = Writes::refused;
   // Commands go on; no restart of the connection keeps the pressure or brings it back.
-  ASSERT_TRUE(wait_for([&] { return vented(); }, 0.5)) << driver_->printed();
+  ASSERT_TRUE(command_until(0.5, [&] { return vented(); })) << driver_->printed();
   EXPECT_LE(terminal_.requests, kRequestsOfATimeOut) << "each kept the pressure for 0.3 s more";
-  const int connections = status_.connections;
-  ASSERT_TRUE(wait_for([&] { return status_.connections > connections + 1; }, 0.5));
+  const std::int64_t connections = valves().connections;
+  ASSERT_TRUE(command_until(0.5, [&] { return valves().connections > connections + 1; }));
   EXPECT_TRUE(vented());
   terminal_.writes = Writes::obeyed;
   // An operator has to look first: commands must be zero once.
-  ASSERT_TRUE(wait_for([&] { return is(ValveState::vented, ValveReason::waiting_for_zero); }, 0.5))
-      << driver_->printed();
-  ASSERT_TRUE(wait_for([&] { return state() == ValveState::running; }, 0.0));
+  ASSERT_TRUE(command_until(0.5, [&] {
+    return is(ValveState::vented, ValveReason::waiting_for_zero);
+  })) << driver_->printed();
+  ASSERT_TRUE(command_until(0.0, [&] { return valves().state == ValveState::running; }));
   EXPECT_TRUE(run_at(0.5));
 }
 
@@ -81,8 +79,9 @@ TEST_F(ValvesAtABadTerminal, AWriteThatIsLostDegrades) {
   begin();
   ASSERT_TRUE(run_at(0.5)) << driver_->printed();
   terminal_.writes = Writes::ignored;
-  ASSERT_TRUE(wait_for([&] { return is(ValveState::degraded, ValveReason::echo_mismatch); }, 0.6))
-      << driver_->printed();
+  ASSERT_TRUE(command_until(0.6, [&] {
+    return is(ValveState::degraded, ValveReason::echo_mismatch);
+  })) << driver_->printed();
   terminal_.writes = Writes::obeyed;
   EXPECT_TRUE(run_at(0.6)) << driver_->printed();
 }
@@ -94,8 +93,7 @@ TEST_F(ValvesAtABadTerminal, ExitCode0MeansThatMeasuredPressureHasFallen) {
     begin();
     ASSERT_TRUE(run_at(0.5)) << driver_->printed();
     terminal_.writes = each;
-    driver_->signal(SIGTERM);
-    const int code = driver_->wait(5s);
+    const int code = end(*driver_);
     const double bar = terminal_.pressure_bar();
     EXPECT_EQ(code, each == Writes::obeyed ? 0 : 1) << driver_->printed();
     if (each == Writes::obeyed) {
@@ -107,14 +105,13 @@ TEST_F(ValvesAtABadTerminal, ExitCode0MeansThatMeasuredPressureHasFallen) {
   begin();
   ASSERT_TRUE(run_at(0.5)) << driver_->printed();
   terminal_.writes = Writes::ignored;
-  driver_->signal(SIGKILL);
-  driver_->wait(5s);
-  statuses_ = 0;
+  end(*driver_, SIGKILL);
   begin();
-  ASSERT_TRUE(wait_for([&] { return statuses_ > 0 && state() != ValveState::disconnected; }))
-      << driver_->printed();
-  driver_->signal(SIGTERM);
-  EXPECT_EQ(driver_->wait(5s), 1) << driver_->printed();
+  const int before = valve_statuses_;
+  ASSERT_TRUE(wait_for([&] {
+    return valve_statuses_ > before && valves().state != ValveState::disconnected;
+  })) << driver_->printed();
+  EXPECT_EQ(end(*driver_), 1) << driver_->printed();
 }
 
 /// Another client of the same terminal.
@@ -138,11 +135,14 @@ TEST_F(ValvesAtABadTerminal, SetPointsOfAnotherMasterDegrade) {
   bool degraded = false;  // one that is written just before the driver's own goes unnoticed
   for (int k = 0; k < 20 && !degraded; ++k) {
     ASSERT_EQ(other.write(kMap.write_address, theirs), LinkResult::ok) << other.error();
-    degraded =
-        wait_for([&] { return is(ValveState::degraded, ValveReason::echo_mismatch); }, 0.5, 0.2);
+    const int before = valve_statuses_;
+    command_until(0.5, [&] {
+      degraded |= is(ValveState::degraded, ValveReason::echo_mismatch);
+      return degraded || valve_statuses_ > before + 3;
+    });
   }
   EXPECT_TRUE(degraded) << driver_->printed();
-  EXPECT_TRUE(wait_for([&] { return vented(); }, 0.5));
+  EXPECT_TRUE(command_until(0.5, [&] { return vented(); }));
 }
 
 TEST_F(ValvesAtABadTerminal, ATimeOutThatAnotherMasterSwitchedOffIsFoundAndSetAgain) {
@@ -153,11 +153,12 @@ TEST_F(ValvesAtABadTerminal, ATimeOutThatAnotherMasterSwitchedOffIsFoundAndSetAg
   ASSERT_TRUE(other.connect());
   const std::array<std::uint16_t, 1> never{0};
   ASSERT_EQ(other.write(kMap.timeout_address, never), LinkResult::ok) << other.error();
-  EXPECT_TRUE(
-      wait_for([&] { return is(ValveState::degraded, ValveReason::failsafe_changed); }, 0.5))
+  EXPECT_TRUE(command_until(0.5, [&] {
+    return is(ValveState::degraded, ValveReason::failsafe_changed);
+  })) << driver_->printed();
+  EXPECT_TRUE(command_until(0.5, [&] { return vented(); }));
+  EXPECT_TRUE(command_until(0.5, [&] { return terminal_.timeout_ms() == 300; }))
       << driver_->printed();
-  EXPECT_TRUE(wait_for([&] { return vented(); }, 0.5));
-  EXPECT_TRUE(wait_for([&] { return terminal_.timeout_ms() == 300; }, 0.5)) << driver_->printed();
   EXPECT_TRUE(run_at(0.5)) << driver_->printed();
   EXPECT_NE(driver_->printed().find("fail-safe time-out changed: set 0.3 s at register 46100, read "
                                     "back 0 s"),
@@ -167,22 +168,19 @@ TEST_F(ValvesAtABadTerminal, ATimeOutThatAnotherMasterSwitchedOffIsFoundAndSetAg
 
 // The check of docs/how-to/connect_valves.md: the driver is killed while every other client stays.
 TEST_F(ValvesProgram, WithTheDriverKilledNoReaderKeepsThePressure) {
-  write_config(1);
-  const auto plant = start_plant();
-  write_config(plant->port());
+  configure(1);
+  const auto plant = start_terminal();
+  configure(plant->port());
   const auto driver = start("softarm-valves");
-  ASSERT_TRUE(wait_for([&] { return pressure_is(0.5); }, 0.5)) << driver->printed();
+  ASSERT_TRUE(command_until(0.5, [&] { return pressure_is(0.5); })) << driver->printed();
   OtherClient reader(plant->port());
   ASSERT_TRUE(reader.connect());
-  driver->signal(SIGKILL);
-  driver->wait(5s);
-  EXPECT_TRUE(wait_for(
-      [&] {
-        std::array<std::uint16_t, 3> words{};
-        EXPECT_EQ(reader.read(kMap.read_address, words), LinkResult::ok) << reader.error();
-        return plant_.vented != 0 && plant_.pressure_bar[0] < 0.02F;
-      },
-      0.5));
+  end(*driver, SIGKILL);
+  EXPECT_TRUE(command_until(0.5, [&] {
+    std::array<std::uint16_t, 3> words{};
+    EXPECT_EQ(reader.read(kMap.read_address, words), LinkResult::ok) << reader.error();
+    return plant_.vented && plant_.pressure_bar[0] < 0.02;
+  }));
 }
 
 }  // namespace
