@@ -114,6 +114,7 @@ struct SafetyInput {
   bool curvature_mismatch = false;              ///< the arm is not where its pressures would put it
   bool oscillation = false;            ///< the arm swings about its reference and does not stop
   bool length_mismatch = false;        ///< the arm is not as long as configured
+  bool paused = false;                 ///< the clock stood still since the last tick
   bool command_expired = false;        ///< the last command expired: the valves have vented
   bool deadman_used = false;           ///< there is a dead-man input
   std::int64_t newest_go_ns = kNever;  ///< arrival of the newest "go"
