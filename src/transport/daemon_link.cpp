@@ -187,7 +187,7 @@ void DaemonLink::take_measurement(const ReceivedMessage& packet) noexcept {
 }
 
 /// Valves that hold no command of ours, or have held none for a while since their last report, have
-/// vented: our command was lost, late, or refused, whatever we believe.
+/// vented: our command was lost, late, or refused, whatever else is known.
 void DaemonLink::take_valves_report() noexcept {
   const bool fell = valves_heard_ns_ != kNever && measurement_message_.expired != valves_expired_;
   valves_expired_ = measurement_message_.expired;
