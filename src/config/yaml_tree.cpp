@@ -47,7 +47,9 @@ class TreeBuilder : public YAML::EventHandler {
   /// A copy of what is at the anchor, within a bound: copies of copies double.
   void OnAlias(const YAML::Mark& mark, YAML::anchor_t anchor) override {
     const auto at = anchors_.find(anchor);
-    if (at == anchors_.end()) fail(mark, fmt::format("an anchor that is complete, of at most {} values", kMaxAliased), "another");
+    if (at == anchors_.end())
+      fail(mark, fmt::format("an anchor that is complete, of at most {} values", kMaxAliased),
+           "another");
     YamlNode copy = at->second;
     copy.location = copy.key_location = node(mark, copy.kind).location;
     aliased_ += size_of(copy);
