@@ -8,13 +8,16 @@
 #include <atomic>
 #include <cerrno>
 #include <cmath>
+#include <csignal>
 #include <cstdio>
 #include <exception>
 #include <filesystem>
 #include <iostream>
+#include <sstream>
 #include <string_view>
 
 #include "softarm/base/instance_lock.hpp"
+#include "softarm/base/output_file.hpp"
 #include "softarm/base/version.hpp"
 #include "softarm/config/config_error.hpp"
 
@@ -50,12 +53,17 @@ int parse_and_run(int argc, char** argv, CLI::App& app, const std::function<int(
     app.exit(CLI::ExtrasError(app.get_name(), unknown));
     return kExitUsage;
   } catch (const ConfigError& error) {
-    print_error(app.get_name(), error.what());
+    std::istringstream lines(error.what());  // one for each error
+    for (std::string line; std::getline(lines, line);) print_error(app.get_name(), line);
     return kExitConfiguration;
+  } catch (const OutputIsInput& error) {
+    print_error(app.get_name(), error.what());
+    return kExitUsage;
   } catch (const OtherInstance& error) {
     print_error(app.get_name(), error.what());
     return kExitOtherInstance;
   } catch (const std::exception& error) {
+    if (std::ferror(stdout) != 0) return kExitOk;  // which run_program reports
     print_error(app.get_name(), error.what());
     return kExitFailure;
   }
@@ -118,10 +126,12 @@ void print_error(const std::string& program, const std::string& message) {
 int run_program(int argc, char** argv, CLI::App& app, const std::function<int()>& body) {
   app.set_version_flag(
       "--version", fmt::format("{} {} (commit {})", app.get_name(), version_text(), commit_text()));
+  std::signal(SIGXFSZ, SIG_IGN);  // a file at its largest size is an error of write()
   const int code = parse_and_run(argc, argv, app, body);
   std::cout.flush();
-  if ((std::fflush(stdout) != 0 || !std::cout) && code == kExitOk) {
-    print_error(app.get_name(), "standard output could not be written");
+  const bool flushed = std::fflush(stdout) == 0;
+  if ((!flushed || std::ferror(stdout) != 0 || !std::cout) && code == kExitOk) {
+    print_error(app.get_name(), "standard output could not be written: is the disk full?");
     return kExitFailure;
   }
   return code;

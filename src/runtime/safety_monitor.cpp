@@ -44,10 +44,11 @@ struct Cause {
   bool (*present)(const Evidence&);
 };
 
-/// Every cause, the most severe first: an emergency stop, `shutdown` because it is final, then by the
-/// mode they demand. Valves that are silent or do not follow are a fault where there is pressure; where there
+/// Every cause, the most severe first: an emergency stop, `shutdown` because it is final, then by
+/// the mode they demand, then by what clears them: of two causes at once the stricter clearance must
+/// not be forgotten. Valves that are silent or do not follow are a fault where there is pressure; where there
 /// is none they only keep the arm from becoming active, so that valves may be switched on after the
-/// daemon. Overruns are ticks missed in a row, and judged only under SCHED_FIFO
+/// daemon. So is an arm of another length, whose marker frames may still be put right. Overruns are ticks missed in a row, and judged only under SCHED_FIFO
 /// (consecutive_overruns is zero otherwise): without it they are only counted.
 constexpr std::array kCauses{
     Cause{{Reason::emergency_stop, Mode::fault, Clearance::disarm_then_arm},
@@ -60,6 +61,8 @@ constexpr std::array kCauses{
           [](const Evidence& e) { return e.input.pressure_mismatch && e.pressurised(); }},
     Cause{{Reason::curvature_mismatch, Mode::fault, Clearance::disarm_then_arm},
           [](const Evidence& e) { return e.input.curvature_mismatch; }},
+    Cause{{Reason::length_mismatch, Mode::fault, Clearance::disarm_then_arm},
+          [](const Evidence& e) { return e.input.length_mismatch && e.pressurised(); }},
     Cause{{Reason::disarmed, Mode::vent, Clearance::arm},
           [](const Evidence& e) { return e.input.requests.disarm; }},
     Cause{{Reason::deadman_released, Mode::vent, Clearance::arm},
@@ -70,20 +73,26 @@ constexpr std::array kCauses{
           [](const Evidence& e) { return e.input.requests.lost; }},
     Cause{{Reason::foreign_commands, Mode::vent, Clearance::arm},
           [](const Evidence& e) { return e.foreign_age_ns <= kForeign_ns; }},
+    Cause{{Reason::soft_limit, Mode::vent, Clearance::arm},
+          [](const Evidence& e) { return e.input.soft_limit_exceeded; }},
+    Cause{{Reason::oscillation, Mode::vent, Clearance::arm},
+          [](const Evidence& e) { return e.input.oscillation; }},
     Cause{{Reason::valves_silent, Mode::vent, Clearance::good_frames},
           [](const Evidence& e) { return e.valves_silent(); }},
     Cause{{Reason::pressure_mismatch, Mode::vent, Clearance::good_frames},
           [](const Evidence& e) { return e.input.pressure_mismatch; }},
+    Cause{{Reason::length_mismatch, Mode::vent, Clearance::good_frames},
+          [](const Evidence& e) { return e.input.length_mismatch; }},
     Cause{{Reason::time_gap, Mode::vent, Clearance::good_frames},
-          [](const Evidence& e) { return e.tick_gap_ns > e.thresholds.vent_after_ns; }},
+          [](const Evidence& e) {
+            return e.input.paused || e.tick_gap_ns > e.thresholds.vent_after_ns;
+          }},
     Cause{{Reason::command_expired, Mode::vent, Clearance::good_frames},
           [](const Evidence& e) { return e.input.command_expired; }},
     Cause{{Reason::sender_restarted, Mode::vent, Clearance::good_frames},
           [](const Evidence& e) { return e.input.sender_restarted; }},
     Cause{{Reason::frames_stale, Mode::vent, Clearance::good_frames},
           [](const Evidence& e) { return e.frame_age_ns > e.thresholds.vent_after_ns; }},
-    Cause{{Reason::soft_limit, Mode::vent, Clearance::arm},
-          [](const Evidence& e) { return e.input.soft_limit_exceeded; }},
     Cause{{Reason::many_overruns, Mode::vent, Clearance::good_frames},
           [](const Evidence& e) {
             return e.settings.vent_overruns > 0 &&
@@ -143,6 +152,8 @@ const char* name(Reason reason) noexcept {
                               "pressure_mismatch",
                               "curvature_mismatch",
                               "command_expired",
+                              "oscillation",
+                              "length_mismatch",
                               "foreign_commands",
                               "requests_lost"};
   static_assert(kNames.size() == static_cast<std::size_t>(kReasons));
@@ -181,7 +192,7 @@ SafetyMonitor::SafetyMonitor(const SafetySettings& settings, double control_peri
 void SafetyMonitor::note_stop(const SafetyInput& input) noexcept {
   if (mode_ == Mode::init) return;
   const std::int64_t stopped_ns = input.now_ns - previous_tick_ns_;
-  if (stopped_ns > thresholds_.vent_after_ns || input.command_expired)
+  if (stopped_ns > thresholds_.vent_after_ns || input.paused || input.command_expired)
     deaf_until_ns_ = input.now_ns + kStale_ns;
   if (stopped_ns > thresholds_.valve_silence_ns &&
       input.newest_measurement_ns > listening_since_ns_)

@@ -166,6 +166,14 @@ bool LcmNode::send(const char* channel, int size) noexcept {
   return lcm_publish(lcm_, channel, buffer_.data(), static_cast<unsigned int>(size)) == 0;
 }
 
+std::string network_warning(const std::string& url) {
+  const char* const other = std::getenv("LCM_DEFAULT_URL");
+  if (other == nullptr || *other == 0) return {};
+  if (lock_name("", other) == lock_name("", url)) return {};
+  return std::string("LCM_DEFAULT_URL is ") + other + ", daemon.lcm.url is " + url +
+         ": softarm uses the latter, other LCM programs of this shell do not hear it";
+}
+
 std::string lock_name(const std::string& channel, const std::string& url) {
   constexpr std::string_view kUdp = "udpm://";
   std::string network = url.substr(0, url.find('?'));
@@ -183,6 +191,12 @@ std::string lock_name(const std::string& channel, const std::string& url) {
     }
   }
   return channel + " on " + network;
+}
+
+bool is_local(const std::string& url) {
+  const std::size_t ttl = url.find("ttl=");
+  return url.starts_with("udpm://") &&
+         (ttl == std::string::npos || std::strtol(url.c_str() + ttl + 4, nullptr, 0) == 0);
 }
 
 }  // namespace softarm

@@ -103,7 +103,7 @@ bool is_intact(std::span<const std::byte> encoded) noexcept {
 void to_record(const TickInput& input, tick_record_t& record) {
   // A new field of TickInput breaks the build here: it must be added to lcmtypes/tick_record_t.lcm,
   // to this function, to RecordedInput::from and to the size that decode() checks.
-  const auto& [now_ns, frames, reference, requests, command_expired, consecutive_overruns,
+  const auto& [now_ns, frames, reference, requests, command_expired, paused, consecutive_overruns,
                newest_measurement_ns, measured_bar, newest_go_ns, newest_foreign_ns] = input;
   const auto& [arm, disarm, emergency_stop, shutdown, lost] = requests;
   record.now_ns = now_ns;
@@ -124,6 +124,7 @@ void to_record(const TickInput& input, tick_record_t& record) {
   record.shutdown = shutdown ? 1 : 0;
   record.requests_lost = lost ? 1 : 0;
   record.command_expired = command_expired ? 1 : 0;
+  record.paused = paused ? 1 : 0;
   record.consecutive_overruns = consecutive_overruns;
   record.newest_measurement_ns = newest_measurement_ns;
   record.newest_go_ns = newest_go_ns;
@@ -157,6 +158,7 @@ const TickInput& RecordedInput::from(const tick_record_t& record) {
                      .shutdown = record.shutdown != 0,
                      .lost = record.requests_lost != 0};
   input_.command_expired = record.command_expired != 0;
+  input_.paused = record.paused != 0;
   input_.consecutive_overruns = record.consecutive_overruns;
   input_.newest_measurement_ns = record.newest_measurement_ns;
   input_.newest_go_ns = record.newest_go_ns;

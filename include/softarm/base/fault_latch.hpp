@@ -12,7 +12,7 @@ namespace softarm {
 /// $XDG_STATE_HOME/softarm, $HOME/.local/state/softarm; otherwise /var/tmp/softarm-UID.
 std::filesystem::path state_directory();
 
-/// One small file that is written by a thread of its own, over bytes that the file has already: a
+/// One small file that is written by a separate thread, over bytes that the file has already: a
 /// full disk does not matter. What cannot be understood counts as a FAULT.
 class FaultLatch {
  public:

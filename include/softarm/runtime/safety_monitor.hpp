@@ -44,6 +44,8 @@ enum class Reason : std::int8_t {
   pressure_mismatch,
   curvature_mismatch,
   command_expired,
+  oscillation,
+  length_mismatch,
   foreign_commands,
   requests_lost
 };
@@ -110,9 +112,12 @@ struct SafetyInput {
   std::int64_t newest_measurement_ns = kNever;  ///< of the valves' read-back
   bool pressure_mismatch = false;               ///< measured pressures do not follow the commands
   bool curvature_mismatch = false;              ///< the arm is not where its pressures would put it
-  bool command_expired = false;             ///< the last command expired: the valves have vented
-  bool deadman_used = false;                ///< there is a dead-man input
-  std::int64_t newest_go_ns = kNever;       ///< arrival of the newest "go"
+  bool oscillation = false;            ///< the arm swings about its reference and does not stop
+  bool length_mismatch = false;        ///< the arm is not as long as configured
+  bool paused = false;                 ///< the clock stood still since the last tick
+  bool command_expired = false;        ///< the last command expired: the valves have vented
+  bool deadman_used = false;           ///< there is a dead-man input
+  std::int64_t newest_go_ns = kNever;  ///< arrival of the newest "go"
   std::int64_t newest_foreign_ns = kNever;  ///< of the newest command that another program sent
   OperatorRequests requests = {};
 };

@@ -33,7 +33,8 @@ struct ArmStatus {
   bool reference_limited =
       false;  ///< a soft limit changed the reference, or a live reference was refused
   bool soft_limit = false;
-  bool bounded = false;  ///< the controller limited a term near a singularity
+  bool bounded = false;         ///< the controller limited a term near a singularity
+  bool length_warning = false;  ///< a segment is measured longer or shorter than configured
 
   double frame_age_s = std::numeric_limits<double>::quiet_NaN();
   std::int64_t frames_accepted = 0;

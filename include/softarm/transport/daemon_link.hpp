@@ -12,6 +12,7 @@
 #include <softarm_messages/torque_command_t.hpp>
 #include <vector>
 
+#include "softarm/base/clock.hpp"
 #include "softarm/base/histogram.hpp"
 #include "softarm/runtime/control_pipeline.hpp"
 #include "softarm/runtime/settings.hpp"
@@ -71,6 +72,10 @@ class DaemonLink {
 
   /// Nonce of the status of this instant.
   std::int64_t nonce(std::int64_t now_ns) const noexcept { return nonces_.at(now_ns / 1000); }
+  /// How long the valves hold a command of ours (us): its validity, or less where they grant less.
+  std::int32_t held_us() const noexcept;
+  /// The validity that commands ask for (us).
+  std::int32_t asked_us() const noexcept { return messages_.pressure_command.validity_us; }
   /// Messages that could not be decoded.
   std::int64_t malformed() const noexcept { return malformed_; }
   /// Publications that failed, and commands that were too late to send.
@@ -81,6 +86,7 @@ class DaemonLink {
   void take_reference(const ReceivedMessage& packet) noexcept;
   void take_operator(const ReceivedMessage& packet) noexcept;
   void take_measurement(const ReceivedMessage& packet) noexcept;
+  void take_valves_report() noexcept;
   void take_go(const ReceivedMessage& packet) noexcept;
   void take_command(const ReceivedMessage& packet) noexcept;
   bool requests_lost(std::int64_t previous_ns) noexcept;
@@ -125,6 +131,13 @@ class DaemonLink {
   SentCommands sent_;
   std::int64_t commands_ = 0;
   std::int64_t sent_us_ = kNever;  ///< time in the newest command
+  PauseWatch pause_;
+  bool paused_while_deciding_ = false;
+  bool valve_readback_ = false;
+  // What the valves have reported.
+  bool valves_vented_ = false;
+  std::int32_t valves_expired_ = 0, granted_us_ = 0;
+  std::int64_t valves_heard_ns_ = kNever;
   std::int64_t malformed_ = 0;
   std::int64_t unsent_ = 0;
 

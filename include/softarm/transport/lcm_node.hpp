@@ -91,4 +91,11 @@ class LcmNode {
 /// spelling of group and port make it a different network.
 std::string lock_name(const std::string& channel, const std::string& url);
 
+/// Whether LCM_DEFAULT_URL names another network than `url`, for a person; empty: it does not.
+/// softarm does not follow the variable, lcm-logger and lcm-spy do.
+std::string network_warning(const std::string& url);
+/// Whether messages sent to `url` stay on this machine, where all read the same monotonic clock:
+/// UDP multicast whose ttl is 0, LCM's default.
+bool is_local(const std::string& url);
+
 }  // namespace softarm

@@ -42,9 +42,9 @@ class RequestFaults : public FaultTest {
     client_->request(OperatorRequest::disarm);
     EXPECT_TRUE(wait_for([&] {
       return mode() == Mode::vent && reason() == Reason::waiting_for_arm;
-    })) << told();
-    EXPECT_EQ(client_->request(OperatorRequest::arm), RequestOutcome::done) << told();
-    EXPECT_TRUE(wait_for([&] { return under_pressure(); })) << told();
+    })) << seen_text();
+    EXPECT_EQ(client_->request(OperatorRequest::arm), RequestOutcome::done) << seen_text();
+    EXPECT_TRUE(wait_for([&] { return under_pressure(); })) << seen_text();
   }
   const LcmSettings& lcm() const { return client_->experiment().transport.lcm; }
 
@@ -57,15 +57,15 @@ TEST_P(RequestFaults, AnEmergencyStopReachesADaemonThatIsHeldUp) {
   const auto daemon = start("softarmd");
   for (const double seconds : {0.1, 0.5, 2.0, 5.0}) {  // the tool waits for less at most times
     SCOPED_TRACE(seconds);
-    ASSERT_TRUE(wait_for([&] { return under_pressure(); })) << told() << daemon->printed();
+    ASSERT_TRUE(wait_for([&] { return under_pressure(); })) << seen_text() << daemon->printed();
     daemon->signal(SIGSTOP);
     wait_for([] { return false; }, 0.5 * seconds);
     const auto stop = start("softarm", {"estop"});
     wait_for([] { return false; }, 0.5 * seconds);
     daemon->signal(SIGCONT);
-    EXPECT_TRUE(becomes(*this, Mode::fault, Reason::emergency_stop)) << told();
+    EXPECT_TRUE(becomes(*this, Mode::fault, Reason::emergency_stop)) << seen_text();
     EXPECT_EQ(stop->wait(20s), 0) << stop->printed();
-    EXPECT_TRUE(stays_away(1.5)) << told();
+    EXPECT_TRUE(stays_away(1.5)) << seen_text();
     arm_again();
   }
 }
@@ -101,11 +101,11 @@ TEST_P(RequestFaults, AStopThatTheSocketDroppedLeavesTheArmVented) {
   wait_for([] { return false; }, 0.5);
   forget();
   daemon->signal(SIGCONT);
-  EXPECT_TRUE(wait_for([&] { return saw(Mode::vent, Reason::requests_lost); })) << told();
-  EXPECT_TRUE(becomes(*this, Mode::vent, Reason::waiting_for_arm)) << told();
-  EXPECT_TRUE(stays_away(1.0)) << told();
+  EXPECT_TRUE(wait_for([&] { return saw(Mode::vent, Reason::requests_lost); })) << seen_text();
+  EXPECT_TRUE(becomes(*this, Mode::vent, Reason::waiting_for_arm)) << seen_text();
+  EXPECT_TRUE(stays_away(1.0)) << seen_text();
   EXPECT_EQ(ask("arm"), 0);
-  EXPECT_TRUE(wait_for([&] { return under_pressure(); })) << told();
+  EXPECT_TRUE(wait_for([&] { return under_pressure(); })) << seen_text();
 }
 
 TEST_P(RequestFaults, AFloodOfRequestsNeitherHidesNorUndoesAnEmergencyStop) {
@@ -124,15 +124,15 @@ TEST_P(RequestFaults, AFloodOfRequestsNeitherHidesNorUndoesAnEmergencyStop) {
       }
     });
     EXPECT_EQ(ask("estop"), 0);
-    EXPECT_TRUE(becomes(*this, Mode::fault, Reason::emergency_stop)) << told();
+    EXPECT_TRUE(becomes(*this, Mode::fault, Reason::emergency_stop)) << seen_text();
     forget();
     wait_for([] { return false; }, 1.0);
-    EXPECT_EQ(seen_.size(), 1u) << told();
+    EXPECT_EQ(seen_.size(), 1u) << seen_text();
     ends = true;
     flood.join();
     EXPECT_EQ(ask("disarm"), 0);
-    EXPECT_EQ(ask("arm"), 0) << told();
-    ASSERT_TRUE(wait_for([&] { return under_pressure(); })) << told();
+    EXPECT_EQ(ask("arm"), 0) << seen_text();
+    ASSERT_TRUE(wait_for([&] { return under_pressure(); })) << seen_text();
   }
 }
 
@@ -154,7 +154,7 @@ TEST_P(RequestFaults, AnEmergencyStopSurvivesTheDaemon) {
       return daemon->printed().find("softarm disarm " + config_.string()) != std::string::npos;
     })) << daemon->printed();
     EXPECT_EQ(ask("arm"), 1);
-    EXPECT_TRUE(stays_away(1.0)) << told();
+    EXPECT_TRUE(stays_away(1.0)) << seen_text();
   }
   arm_again();
   // Acknowledged: the next one knows nothing of it.
@@ -162,7 +162,7 @@ TEST_P(RequestFaults, AnEmergencyStopSurvivesTheDaemon) {
   daemon->wait(5s);
   statuses_ = 0;
   daemon = start("softarmd");
-  EXPECT_TRUE(wait_for([&] { return under_pressure(); })) << told() << daemon->printed();
+  EXPECT_TRUE(wait_for([&] { return under_pressure(); })) << seen_text() << daemon->printed();
 }
 
 TEST_P(RequestFaults, WhereTheFaultCannotBeKeptThatIsReported) {
@@ -208,7 +208,7 @@ TEST_P(RequestFaults, AnArmIsNotObeyedAfterALaterDisarmOrStop) {
       person.update(person.now_ns() + 10'000'000);
       wait_for([&] { return armed |= status_.armed; }, 0.01);
     }
-    EXPECT_FALSE(armed) << told();
+    EXPECT_FALSE(armed) << seen_text();
     EXPECT_EQ(arming->wait(20s), 1) << arming->printed();
     person.send_go(false);
     wait_for([&] { return reason() == Reason::deadman_released; }, 0.5);
@@ -236,7 +236,7 @@ TEST_P(RequestFaults, ARecordThatIsPlayedNeitherArmsNorHoldsTheDeadMan) {
   deadman->signal(SIGINT);
   EXPECT_EQ(deadman->wait(5s), 0);
   EXPECT_EQ(ask("estop"), 0);
-  ASSERT_TRUE(becomes(*this, Mode::fault, Reason::emergency_stop)) << told();
+  ASSERT_TRUE(becomes(*this, Mode::fault, Reason::emergency_stop)) << seen_text();
   client_->on_message({});
   wait_for([] { return false; }, 1.1);  // as long as a nonce counts
   ASSERT_GT(record.size(), 10u);
@@ -248,7 +248,7 @@ TEST_P(RequestFaults, ARecordThatIsPlayedNeitherArmsNorHoldsTheDeadMan) {
     }
   // Nobody is at the dead-man input; somebody disarms, and the record goes on.
   EXPECT_EQ(ask("disarm"), 0);
-  ASSERT_TRUE(becomes(*this, Mode::vent, Reason::deadman_released)) << told();
+  ASSERT_TRUE(becomes(*this, Mode::vent, Reason::deadman_released)) << seen_text();
   forget();
   for (const auto& [channel, bytes] : record) {
     operator_command_t request;
@@ -256,8 +256,8 @@ TEST_P(RequestFaults, ARecordThatIsPlayedNeitherArmsNorHoldsTheDeadMan) {
     node_->publish_encoded(channel, bytes);
     wait_for([] { return false; }, 0.002);
   }
-  EXPECT_EQ(seen_.size(), 1u) << told();
-  EXPECT_TRUE(saw(Mode::vent, Reason::deadman_released)) << told();
+  EXPECT_EQ(seen_.size(), 1u) << seen_text();
+  EXPECT_TRUE(saw(Mode::vent, Reason::deadman_released)) << seen_text();
 }
 
 TEST_P(RequestFaults, ACommandOfSomebodyElseVents) {
@@ -265,15 +265,15 @@ TEST_P(RequestFaults, ACommandOfSomebodyElseVents) {
   const auto plant = start_plant(*this);
   const auto daemon = start("softarmd");
   ASSERT_TRUE(wait_for([&] { return under_pressure(); })) << daemon->printed();
-  EXPECT_FALSE(saw(Mode::vent, Reason::foreign_commands)) << told();
+  EXPECT_FALSE(saw(Mode::vent, Reason::foreign_commands)) << seen_text();
   softarm_messages::pressure_command_t foreign{};
   foreign.sequence = 1'000'000'000;
   foreign.validity_us = 1000;
   foreign.num_chambers = static_cast<std::int16_t>(command_.pressure_bar.size());
   foreign.pressure_bar.assign(static_cast<std::size_t>(foreign.num_chambers), 0.0F);
   node_->publish(lcm().command_channel, foreign);
-  EXPECT_TRUE(becomes(*this, Mode::vent, Reason::foreign_commands)) << told();
-  EXPECT_TRUE(becomes(*this, Mode::vent, Reason::waiting_for_arm)) << told();
+  EXPECT_TRUE(becomes(*this, Mode::vent, Reason::foreign_commands)) << seen_text();
+  EXPECT_TRUE(becomes(*this, Mode::vent, Reason::waiting_for_arm)) << seen_text();
   // While there is somebody else, nobody can arm.
   std::atomic<bool> ends{false};
   std::thread other([&] {
@@ -283,9 +283,9 @@ TEST_P(RequestFaults, ACommandOfSomebodyElseVents) {
       node.publish(lcm().command_channel, foreign);
     }
   });
-  EXPECT_TRUE(becomes(*this, Mode::vent, Reason::foreign_commands)) << told();
+  EXPECT_TRUE(becomes(*this, Mode::vent, Reason::foreign_commands)) << seen_text();
   EXPECT_EQ(ask("arm"), 1);
-  EXPECT_TRUE(stays_away(0.5)) << told();
+  EXPECT_TRUE(stays_away(0.5)) << seen_text();
   ends = true;
   other.join();
 }
@@ -305,7 +305,7 @@ TEST_P(RequestFaults, AStuckStandardErrorKeepsNothingFromEnding) {
                  {"-c", "exec " + std::string(SOFTARM_BINARY_DIR) + "/bin/softarmd " +
                             config_.string() + " 2>" + pipe.string()},
                  (folder_ / "stuck").string());
-  ASSERT_TRUE(wait_for([&] { return under_pressure(); })) << told();
+  ASSERT_TRUE(wait_for([&] { return under_pressure(); })) << seen_text();
   daemon.signal(SIGTERM);
   EXPECT_EQ(daemon.wait(10s), 0);
   close(end);
@@ -323,7 +323,7 @@ TEST_P(RequestFaults, AnEmergencyStopDoesNotWaitForAFile) {
   often << "daemon: {lcm: {url: \"" << url_ << "\"}}\n";
   often.close();
   EXPECT_EQ(ask("estop"), 0);
-  EXPECT_TRUE(becomes(*this, Mode::fault, Reason::emergency_stop)) << told();
+  EXPECT_TRUE(becomes(*this, Mode::fault, Reason::emergency_stop)) << seen_text();
   config_ = folder_ / "pipe.yaml";
   ASSERT_EQ(mkfifo(config_.c_str(), 0600), 0);
   for (const char* command : {"estop", "disarm", "arm", "check"}) EXPECT_EQ(ask(command), 78);

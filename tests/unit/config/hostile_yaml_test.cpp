@@ -49,7 +49,7 @@ TEST(HostileYaml, AliasesAreRefusedBeforeTheyMultiply) {
     line << "a" << i << ": &a" << i << " [*a" << i - 1 << ", *a" << i - 1 << "]\n";
     bomb += line.str();
   }
-  EXPECT_NE(refusal(folder.write("bomb.yaml", bomb)).find("no anchors"), std::string::npos);
+  EXPECT_NE(refusal(folder.write("bomb.yaml", bomb)).find("aliases of at most"), std::string::npos);
   EXPECT_NE(refusal(folder.write("merge.yaml", "<<: *x\n")), "");
 }
 
@@ -95,10 +95,10 @@ TEST(HostileYaml, WindowsLineEndsAreFine) {
 
 TEST(HostileYaml, IncludesAreBounded) {
   const TestFolder folder;
-  EXPECT_NE(refusal(folder.write("self.yaml", "include: self.yaml\n")).find("nested includes"),
+  EXPECT_NE(refusal(folder.write("self.yaml", "include: self.yaml\n")).find("circle"),
             std::string::npos);
   folder.write("ping.yaml", "include: pong.yaml\n");
-  EXPECT_NE(refusal(folder.write("pong.yaml", "include: ping.yaml\n")).find("nested includes"),
+  EXPECT_NE(refusal(folder.write("pong.yaml", "include: ping.yaml\n")).find("circle"),
             std::string::npos);
   EXPECT_NE(refusal(folder.write("gone.yaml", "a: 1\ninclude: nowhere.yaml\n")).find(":2: include"),
             std::string::npos);

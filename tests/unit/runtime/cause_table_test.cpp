@@ -100,6 +100,9 @@ const std::vector<Row>& rows() {
       {Reason::curvature_mismatch, Mode::fault, Clearance::disarm_then_arm, false, 1,
        [](Bench& b) { b.input.curvature_mismatch = true; },
        [](Bench& b) { b.input.curvature_mismatch = false; }},
+      {Reason::length_mismatch, Mode::fault, Clearance::disarm_then_arm, true, 1,
+       [](Bench& b) { b.input.length_mismatch = true; },
+       [](Bench& b) { b.input.length_mismatch = false; }},
       {Reason::disarmed, Mode::vent, Clearance::arm, false, 1,
        [](Bench& b) { b.input.requests.disarm = true; }, nothing},
       {Reason::deadman_released, Mode::vent, Clearance::arm, false, 102,
@@ -109,6 +112,11 @@ const std::vector<Row>& rows() {
       {Reason::foreign_commands, Mode::vent, Clearance::arm, false, 1,
        [](Bench& b) { b.input.newest_foreign_ns = b.input.now_ns; },
        [](Bench& b) { b.input.newest_foreign_ns = kNever; }},
+      {Reason::soft_limit, Mode::vent, Clearance::arm, false, 1,
+       [](Bench& b) { b.input.soft_limit_exceeded = true; },
+       [](Bench& b) { b.input.soft_limit_exceeded = false; }},
+      {Reason::oscillation, Mode::vent, Clearance::arm, false, 1,
+       [](Bench& b) { b.input.oscillation = true; }, [](Bench& b) { b.input.oscillation = false; }},
       {Reason::time_gap, Mode::vent, Clearance::good_frames, false, 1,
        [](Bench& b) { b.gap_ns = 150 * kMs; }, nothing},
       {Reason::command_expired, Mode::vent, Clearance::good_frames, false, 1,
@@ -118,9 +126,6 @@ const std::vector<Row>& rows() {
        [](Bench& b) { b.input.sender_restarted = true; }, nothing},
       {Reason::frames_stale, Mode::vent, Clearance::good_frames, false, 50,
        [](Bench& b) { b.frames = false; }, [](Bench& b) { b.frames = true; }},
-      {Reason::soft_limit, Mode::vent, Clearance::arm, false, 1,
-       [](Bench& b) { b.input.soft_limit_exceeded = true; },
-       [](Bench& b) { b.input.soft_limit_exceeded = false; }},
       {Reason::many_overruns, Mode::vent, Clearance::good_frames, false, 1,
        [](Bench& b) { b.input.consecutive_overruns = 10; },
        [](Bench& b) { b.input.consecutive_overruns = 0; }},
@@ -254,11 +259,15 @@ TEST(CauseTableInCode, TheMoreSevereComeFirst) {
   const auto rules = cause_table();
   EXPECT_EQ(rules[0].reason, Reason::emergency_stop);
   EXPECT_EQ(rules[1].reason, Reason::shutdown);
-  for (std::size_t k = 3; k < rules.size(); ++k)
+  for (std::size_t k = 3; k < rules.size(); ++k) {
     EXPECT_LE(rules[k].demands, rules[k - 1].demands) << name(rules[k].reason);
+    if (rules[k].demands == rules[k - 1].demands) {
+      EXPECT_LE(rules[k].clearance, rules[k - 1].clearance) << name(rules[k].reason);
+    }
+  }
 }
 
-TEST(CauseTableInCode, AnEmergencyStopIsToldEvenAfterAnotherFault) {
+TEST(CauseTableInCode, AnEmergencyStopIsReportedEvenAfterAnotherFault) {
   Bench bench(Arming::automatic);
   bench.activate();
   bench.input.pressure_mismatch = true;
@@ -267,7 +276,7 @@ TEST(CauseTableInCode, AnEmergencyStopIsToldEvenAfterAnotherFault) {
   EXPECT_EQ(bench.tick(), Mode::fault);
   EXPECT_EQ(bench.monitor.reason(), Reason::emergency_stop);
   bench.input.requests.disarm = bench.input.requests.emergency_stop = true;
-  EXPECT_EQ(bench.tick(), Mode::fault) << "of two people the one who wants it stopped is right";
+  EXPECT_EQ(bench.tick(), Mode::fault) << "of two requests the stop wins";
 }
 
 TEST(CauseTableInCode, AnEmergencyStopIsReportedDuringAShutdownAndKept) {
@@ -346,7 +355,7 @@ TEST(CauseTableInCode, AFaultIsNotAcknowledgedWhileItLasts) {
   ASSERT_EQ(bench.tick(), Mode::fault);
   bench.input.requests.disarm = true;
   EXPECT_EQ(bench.tick(), Mode::fault) << "there is still pressure";
-  bench.run(200);  // vented by now: nothing may have pressure any more, and nobody can tell
+  bench.run(200);  // vented by now: nothing may have pressure any more, but no sensor confirms it
   bench.input.requests.disarm = true;
   EXPECT_EQ(bench.tick(), Mode::vent);
   bench.run(100);

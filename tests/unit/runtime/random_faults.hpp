@@ -42,7 +42,7 @@ class RandomFaults {
     if (rarely(others_)) bench_.input.newest_foreign_ns = bench_.now_ns;
   }
 
-  bool spoil(MocapFrame& frame) {
+  bool corrupt(MocapFrame& frame) {
     const std::size_t body = std::uniform_int_distribution<std::size_t>(0, 3)(random_);
     const int axis = std::uniform_int_distribution<int>(0, 2)(random_);
     switch (spell_) {

@@ -33,7 +33,7 @@ std::vector<LengthField> length_fields(const Message&) {
 std::vector<LengthField> length_fields(const mocap_frame_t&) { return {{24, 2}}; }
 std::vector<LengthField> length_fields(const pressure_command_t&) { return {{29, 2}}; }
 std::vector<LengthField> length_fields(const torque_command_t&) { return {{29, 2}}; }
-std::vector<LengthField> length_fields(const pressure_measurement_t&) { return {{24, 2}}; }
+std::vector<LengthField> length_fields(const pressure_measurement_t&) { return {{33, 2}}; }
 std::vector<LengthField> length_fields(const curvature_reference_t&) { return {{16, 2}}; }
 std::vector<LengthField> length_fields(const valves_status_t&) { return {{64, 2}}; }
 std::vector<LengthField> length_fields(const plant_state_t&) { return {{17, 2}, {19, 2}}; }
@@ -41,8 +41,8 @@ std::vector<LengthField> length_fields(const tick_record_t& record) {
   const auto lists = static_cast<std::size_t>(record.num_chambers + 3 * record.dimension);
   const auto bodies = static_cast<std::size_t>(record.frames.at(0).num_bodies);
   const auto measured = static_cast<std::size_t>(record.num_measured);
-  const std::size_t frame = 83 + 8 * lists + 4 * measured;
-  return {{75, 2}, {77, 2}, {79, 2}, {81, 2}, {frame + 16, 2}, {frame + 18 + 61 * bodies, 4}};
+  const std::size_t frame = 84 + 8 * lists + 4 * measured;
+  return {{76, 2}, {78, 2}, {80, 2}, {82, 2}, {frame + 16, 2}, {frame + 18 + 61 * bodies, 4}};
 }
 std::vector<LengthField> length_fields(const controller_status_t& status) {
   const std::size_t counts = 56 + 4 + status.version.size() + 1 + 4 + 4 + 24;
