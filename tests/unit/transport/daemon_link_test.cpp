@@ -46,9 +46,9 @@ class DaemonLinkOverUdp : public ::testing::Test {
     }
   }
 
-  std::unique_ptr<DaemonLink> make_link() const {
+  std::unique_ptr<DaemonLink> make_link(bool shadow = false) const {
     return std::make_unique<DaemonLink>(settings, transport,
-                                        Provenance{.version = "test", .build = "build"}, false);
+                                        Provenance{.version = "test", .build = "build"}, shadow);
   }
 
   void ask(std::int64_t sequence, std::int8_t request, std::int64_t nonce) {
@@ -297,6 +297,13 @@ TEST_F(DaemonLinkOverUdp, AnArmMustEchoAStatusOfTheLastSecondSinceTheLastStop) {
   link = make_link();
   ask(++number, kArm, before + 1'000'000);
   EXPECT_TRUE(nothing_comes(arms));
+}
+
+// Nobody echoes its status.
+TEST_F(DaemonLinkOverUdp, AShadowIsArmedWithTheDaemonThatCommands) {
+  link = make_link(true);
+  ask(1, kArm, 0);
+  EXPECT_TRUE(collect_until(arms));
 }
 
 TEST_F(DaemonLinkOverUdp, AnArmFromBeforeAVentIsRefused) {
