@@ -3,7 +3,6 @@
 
 #include <gtest/gtest.h>
 #include <sys/stat.h>
-#include <unistd.h>
 
 #include <filesystem>
 #include <string>
@@ -53,7 +52,7 @@ TEST_F(NetworkSearch, EndsWhereFilesIncludeOneAnotherOrAreNotThere) {
   for (int k = 0; k < 12; ++k) often += "include: often.yaml\n";
   EXPECT_EQ(find_network(write("often.yaml", often + "url: udpm://239.1.1.4:4\n")).url,
             "udpm://239.1.1.4:4");
-  const fs::path pipe = folder_ / "pipe.yaml";
+  const std::filesystem::path pipe = folder_ / "pipe.yaml";
   ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
   EXPECT_EQ(find_network(pipe).url, LcmSettings().url);
 }

@@ -167,8 +167,9 @@ TEST_P(TypicalMistake, IsAnsweredWithItsKeyAndTheFix) {
     FAIL() << "accepted";
   } catch (const ConfigError& error) {
     const std::string all = error.what();
-    if (*mistake.key != 0)
+    if (*mistake.key != 0) {
       EXPECT_NE(all.find(std::string(" ") + mistake.key), std::string::npos) << all;
+    }
     EXPECT_NE(all.find(mistake.fix), std::string::npos) << all;
     EXPECT_EQ(std::count(all.begin(), all.end(), '\n'), 0) << "one mistake, one message:\n" << all;
   }
