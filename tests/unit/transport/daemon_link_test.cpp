@@ -124,6 +124,7 @@ TEST_F(DaemonLinkOverUdp, TenThousandTicksAllocateNothing) {
   LoopTiming timing;
   const LcmSettings& lcm = transport.lcm;
   pressure_measurement_t measurement = test::example<pressure_measurement_t>(3, 4);
+  measurement.sequence = 1;  // some command is in force
   curvature_reference_t reference = test::example<curvature_reference_t>(3, 4);
   operator_command_t operator_command{
       .sequence = 0, .nonce = 0, .request = operator_command_t::ARM};
