@@ -191,8 +191,8 @@ void DaemonLink::take_measurement(const ReceivedMessage& packet) noexcept {
   if (messages_.pressure_command.shadow == 0) input_.measured_bar = &measured_bar_;
 }
 
-/// Valves that hold no command of ours, or have held none for a while since their last report, have
-/// vented: our command was lost, late, or refused, whatever else is known.
+/// Valves that hold no command, or held none for a while since their last report, have vented: our
+/// command was lost, late, or refused, although it was sent in time.
 void DaemonLink::take_valves_report() noexcept {
   const bool fell = valves_heard_ns_ != kNever && measurement_message_.expired != valves_expired_;
   valves_expired_ = measurement_message_.expired;

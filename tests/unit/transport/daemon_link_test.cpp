@@ -212,6 +212,41 @@ TEST_F(DaemonLinkOverUdp, WhatWasDecidedBeforeTheValvesVentedIsNotSentAfterIt) {
   EXPECT_EQ(link->unsent(), 1);
 }
 
+// Commands may have been lost on the way although this side sent them in time.
+TEST_F(DaemonLinkOverUdp, ValvesThatReportThatTheyHaveVentedAreACommandThatExpired) {
+  settings.safety.valve_readback = false;  // heard all the same
+  link = std::make_unique<DaemonLink>(settings, transport, Provenance{.build = "build"}, false);
+  TickOutput output;
+  output.pressure_bar = PressureVector::Constant(12, 0.5);
+  pressure_measurement_t report = test::example<pressure_measurement_t>(3, 4);
+  const auto expired = [](const TickInput& input) { return input.command_expired; };
+  link->publish_command(now_ns, output);
+  sender->publish(transport.lcm.measurement_channel, report);
+  EXPECT_TRUE(nothing_comes(expired)) << "in force";
+
+  report.sequence = -1;
+  sender->publish(transport.lcm.measurement_channel, report);
+  ASSERT_TRUE(collect_until(expired));
+  EXPECT_TRUE(link->collect(now_ns).command_expired) << "until they report one";
+  report.sequence = 6;
+  sender->publish(transport.lcm.measurement_channel, report);
+  ASSERT_TRUE(collect_until([](const TickInput& input) { return !input.command_expired; }));
+
+  // The report of the vent was lost too; the next one counts it.
+  ++report.expired;
+  sender->publish(transport.lcm.measurement_channel, report);
+  ASSERT_TRUE(collect_until(expired));
+  EXPECT_FALSE(link->collect(now_ns).command_expired) << "once";
+
+  // They grant less than commands ask for, so commands expire earlier.
+  const std::int64_t granted_ns = to_ns(settings.safety.command_validity_s) / 2;
+  report.validity_us = static_cast<std::int32_t>(granted_ns / 1000);
+  sender->publish(transport.lcm.measurement_channel, report);
+  ASSERT_TRUE(collect_until([&](const TickInput&) { return link->held_us() < link->asked_us(); }));
+  EXPECT_FALSE(link->collect(now_ns + granted_ns - 1000).command_expired);
+  EXPECT_TRUE(link->collect(now_ns + granted_ns).command_expired);
+}
+
 TEST_F(DaemonLinkOverUdp, AFloodIsBoundedWork) {
   for (int k = 0; k < 2000; ++k) sender->publish(transport.lcm.mocap_channel, straight_frame(k));
   std::size_t most = 0, all = 0;
