@@ -257,8 +257,9 @@ class Checks {
         check_channel(seen, key, body.name, body_channel(transport.lcm, body));
       };
       const BodySettings& bodies = transport.bodies;
-      if (bodies.base_id >= 0) check("daemon.bodies.base_plate.name", bodies.base_plate);
-      for (const auto& body : bodies.segment_plates) check("daemon.bodies.segment_plates", body);
+      if (bodies.base_id >= 0) check("daemon.bodies.base_plate.name", bodies.base_marker_frame);
+      for (const auto& body : bodies.segment_marker_frames)
+        check("daemon.bodies.segment_plates", body);
     }
     const std::string& url = transport.lcm.url;
     const std::string example = ", such as udpm://239.255.76.67:7667?ttl=0";

@@ -22,7 +22,7 @@ namespace {
 class StaticReach {
  public:
   explicit StaticReach(const Experiment& experiment)
-      : arm_(experiment.arm), workspace_(experiment.arm.size()), allocator_(experiment.actuation) {}
+      : arm_(experiment.arm), workspace_(experiment.arm), allocator_(experiment.actuation) {}
 
   /// The smallest part s of the torque that a segment's chambers give in this pose (2n, rad).
   double scale(const std::vector<double>& u_rad) {

@@ -148,7 +148,7 @@ class Loop {
     return std::sqrt(sum / std::max(1, count));
   }
 
-  /// The loop is linear: what has become large or small may be measured anew.
+  /// The loop is linear: a state that has become large or small may be rescaled.
   void scale(double factor) {
     arm_.scale(factor);
     filter_.scale(factor);

@@ -69,7 +69,7 @@ bool EventLogReader::meets_sync(std::size_t size) {
 }
 
 /// Size of the event at the cursor, or 0 if there is no acceptable one.
-std::size_t EventLogReader::believable_size() {
+std::size_t EventLogReader::plausible_size() {
   if (available(kHeader) < kHeader || !sync_at(0)) return 0;
   const std::byte* header = buffer_.data() + at_;
   const std::uint64_t channel = number_at(header + 20, 4);
@@ -117,7 +117,7 @@ bool EventLogReader::next(LogEvent& event) {
   at_ += std::exchange(event_, 0);
   const std::int64_t begin = position();
   std::size_t size = 0;
-  while (available(1) > 0 && (size = believable_size()) == 0) skip_to_sync();
+  while (available(1) > 0 && (size = plausible_size()) == 0) skip_to_sync();
   if (position() > begin) add_damage(begin, position());
   if (size == 0) return false;
   const std::byte* header = buffer_.data() + at_;

@@ -20,7 +20,6 @@ class DynamicsWorkspace {
  public:
   /// @throws std::invalid_argument if the arm has no segments.
   explicit DynamicsWorkspace(const ArmParameters& arm);
-  explicit DynamicsWorkspace(int segments);
   ~DynamicsWorkspace();
   DynamicsWorkspace(DynamicsWorkspace&&) noexcept;
   DynamicsWorkspace& operator=(DynamicsWorkspace&&) noexcept;

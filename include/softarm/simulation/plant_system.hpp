@@ -1,5 +1,5 @@
-// The mechanics of a simulated arm: an equation of motion in coordinates of its own, and what can
-// be seen of it from outside.
+// The mechanics of a simulated arm: an equation of motion in its own coordinates, and what can be
+// seen of it from outside.
 #pragma once
 
 #include <Eigen/Core>

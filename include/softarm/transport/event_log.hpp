@@ -73,7 +73,7 @@ class EventLogReader {
   std::size_t available(std::size_t wanted);
   bool sync_at(std::size_t offset) const;
   bool meets_sync(std::size_t size);
-  std::size_t believable_size();
+  std::size_t plausible_size();
   void skip_to_sync();
   void add_damage(std::int64_t begin, std::int64_t end);
 

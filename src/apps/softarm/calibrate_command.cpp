@@ -30,17 +30,17 @@ constexpr double kNoPressure_bar = 0.01;
 struct CalibrateOptions {
   std::string config, output;
   double duration_s = 5.0;
-  BaseSource base = BaseSource::plate;
+  BaseSource base = BaseSource::marker_frame;
 };
 
 /// Body poses: as the source sends them, in our world, without the configured marker frames.
-Experiment without_plates(Experiment experiment) {
-  const auto clear = [](MarkerFrameSettings& plate) {
-    plate.position_m.setZero();
-    plate.rotation_rad.setZero();
+Experiment without_marker_frames(Experiment experiment) {
+  const auto clear = [](MarkerFrameSettings& frame) {
+    frame.position_m.setZero();
+    frame.rotation_rad.setZero();
   };
-  clear(experiment.transport.bodies.base_plate);
-  for (MarkerFrameSettings& plate : experiment.transport.bodies.segment_plates) clear(plate);
+  clear(experiment.transport.bodies.base_marker_frame);
+  for (MarkerFrameSettings& frame : experiment.transport.bodies.segment_marker_frames) clear(frame);
   return experiment;
 }
 
@@ -49,7 +49,7 @@ std::vector<MocapFrame> watch(const Experiment& experiment, double duration_s) {
   std::vector<MocapFrame> frames;
   std::int64_t first_ns = 0;
   double most_bar = 0.0;
-  ArmClient client(without_plates(experiment));
+  ArmClient client(without_marker_frames(experiment));
   client.on_frame([&](const CapturedFrame& captured) {
     if (frames.empty()) first_ns = captured.arrival_ns;
     frames.push_back(captured.frame);
@@ -117,7 +117,7 @@ void add_calibrate_command(CLI::App& app) {
           "source of the arm's axis at the base: its marker frame as configured (plate), or "
           "arm.base.rotation (arm)")
       ->transform(CLI::CheckedTransformer(std::map<std::string, BaseSource>{
-          {"plate", BaseSource::plate}, {"arm", BaseSource::arm}}));
+          {"plate", BaseSource::marker_frame}, {"arm", BaseSource::arm}}));
   command->callback([options] {
     if (const int code = calibrate(*options); code != kExitOk) throw CLI::RuntimeError(code);
   });

@@ -33,6 +33,9 @@ void add_report_command(CLI::App& app);
 /// softarm run CONFIG [--out DIR] [--duration S] [--seed N]
 void add_run_command(CLI::App& app);
 
+/// softarm view CONFIG [--log LOG] [--port PORT] [--control]
+void add_view_command(CLI::App& app);
+
 /// softarm watch CONFIG [--out DIR] [--duration S]
 void add_watch_command(CLI::App& app);
 

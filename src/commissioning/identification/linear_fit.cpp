@@ -106,7 +106,7 @@ Eigen::VectorXd leftover(const ArmHypothesis& arm, const SmoothMotion& motion) {
   for (std::size_t k = 0; k < motion.u.size(); ++k) {
     const Eigen::VectorXd& v = motion.velocity[k];
     inverse_dynamics(arm.arm, workspace, motion.u[k], v, v, motion.acceleration[k], {}, part);
-    push_force(arm, motion.u[k], motion.input[k], force);
+    actuation_force(arm, motion.u[k], motion.input[k], force);
     part -= force;
     spring_force(arm, motion.u[k], force);
     part += force;
@@ -161,7 +161,7 @@ LinearFit fit_linear(const ParameterSet& set, const MotionRecord& record,
   arm = set.arm(fit.x);
   Eigen::VectorXd force(arm.arm.dof());
   for (std::size_t k = 0; k < motion.u.size(); ++k) {
-    push_force(arm, motion.u[k], motion.input[k], force);
+    actuation_force(arm, motion.u[k], motion.input[k], force);
     fit.moment_rms_nm += force.squaredNorm();
   }
   fit.moment_rms_nm = std::sqrt(fit.moment_rms_nm / static_cast<double>(before.size()));

@@ -153,8 +153,8 @@ TEST(ClosedLoop, CoupleActuationTracksBelowPi) {
 }
 
 TEST(ClosedLoop, EveryShippedArmTracksItsReference) {
-  // Rest of the shipped experiments: a steady state within a few milliradian says maps, signs and
-  // gains agree.
+  // Rest of the shipped experiments: a steady state within a few milliradian shows that maps,
+  // signs and gains agree.
   for (const char* name : {"one_segment.yaml", "planar_arm.yaml"}) {
     const Tracking tracking = track(configured(name), 6.0, 4.0);
     EXPECT_GT(tracking.active_s, 5.0) << name;

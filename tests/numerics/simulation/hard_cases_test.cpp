@@ -72,7 +72,7 @@ Outcome run(const Case& example, double relative_tolerance, double absolute_tole
   return balanced_run(settings, example.pressures, example.duration_s, 50);
 }
 
-/// As integrated where a configuration says nothing of it.
+/// As integrated by default.
 Outcome run_by_default(const Case& example) {
   const PlantSettings defaults;
   PlantSettings settings = example.settings;

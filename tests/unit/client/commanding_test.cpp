@@ -133,7 +133,7 @@ TEST_F(Commanding, OthersAreNoticedAndOneselfIsNot) {
   ASSERT_TRUE(wait_for([&] { return heard == 7; }));
   EXPECT_NE(client->other_commander().find(lcm.command_channel), std::string::npos);
   now_ns += 1001 * kMs;
-  EXPECT_EQ(client->other_commander(), "") << "who has fallen silent";
+  EXPECT_EQ(client->other_commander(), "") << "it has fallen silent";
   publish_status(Mode::vent, Reason::waiting_for_arm);
   ASSERT_TRUE(client->wait_for_status(test::kPatience_s));
   EXPECT_EQ(client->other_commander(), "") << "a daemon that is not armed";

@@ -10,7 +10,7 @@ namespace {
 
 using namespace softarm_messages;
 
-/// A daemon that reports its state 200 times a second, and hears badly.
+/// A daemon that reports its state 200 times a second and loses requests.
 class Daemon {
  public:
   Daemon(const LcmSettings& lcm, controller_status_t status, int deaf_to)
@@ -109,7 +109,7 @@ TEST_F(Requests, AFaultForAnotherReasonIsNoEmergencyStop) {
 }
 
 TEST_F(Requests, WithoutADaemonNobodyIsHeard) {
-  // An answer from before the question, and a shadow's, are none.
+  // A status from before the request is not an answer, nor is a shadow's.
   publish_status(Mode::active, Reason::none, controller_status_t::ARMED);
   std::thread shadow([this] {
     for (int k = 0; k < 20; ++k) {

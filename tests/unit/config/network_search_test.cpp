@@ -2,28 +2,21 @@
 #include "softarm/config/network_search.hpp"
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
-#include <fstream>
+#include <filesystem>
 #include <string>
+
+#include "test_folder.hpp"
 
 namespace softarm {
 namespace {
 
-namespace fs = std::filesystem;
-
 class NetworkSearch : public ::testing::Test {
  protected:
-  void SetUp() override {
-    folder_ = fs::temp_directory_path() / ("softarm_network_" + std::to_string(getpid()));
-    fs::create_directories(folder_);
+  std::filesystem::path write(const std::string& name, const std::string& text) const {
+    return folder_.write(name, text);
   }
-  void TearDown() override { fs::remove_all(folder_); }
-  fs::path write(const std::string& name, const std::string& text) const {
-    std::ofstream(folder_ / name) << text;
-    return folder_ / name;
-  }
-  fs::path folder_;
+  TestFolder folder_;
 };
 
 TEST_F(NetworkSearch, ReadsWhatStandsInBrokenYaml) {

@@ -156,7 +156,7 @@ TEST(CurvatureEstimator, WhatHasNoBendIsNotValid) {
   BodyPose turned = body_at(Eigen::Isometry3d(Eigen::Translation3d(0, 0, 0.11)));
   turned.orientation = Eigen::Quaterniond(0, 0, 0, 1);
   EXPECT_FALSE(estimator.segment(0, base, turned).valid);
-  // A full circle: which way it went cannot be told. Swapped ends look so, too.
+  // A full circle: its direction is not observable. Swapped ends look the same.
   EXPECT_FALSE(estimator.segment(0, turned, base).valid);
   BodyPose below = base;
   below.position_m.z() = -0.11;

@@ -255,7 +255,7 @@ TEST(CauseTableInCode, TheMoreSevereComeFirst) {
   }
 }
 
-TEST(CauseTableInCode, AnEmergencyStopIsToldEvenAfterAnotherFault) {
+TEST(CauseTableInCode, AnEmergencyStopIsReportedEvenAfterAnotherFault) {
   Bench bench(Arming::automatic);
   bench.activate();
   bench.input.pressure_mismatch = true;
@@ -264,7 +264,7 @@ TEST(CauseTableInCode, AnEmergencyStopIsToldEvenAfterAnotherFault) {
   EXPECT_EQ(bench.tick(), Mode::fault);
   EXPECT_EQ(bench.monitor.reason(), Reason::emergency_stop);
   bench.input.requests.disarm = bench.input.requests.emergency_stop = true;
-  EXPECT_EQ(bench.tick(), Mode::fault) << "of two people the one who wants it stopped is right";
+  EXPECT_EQ(bench.tick(), Mode::fault) << "of two requests the stop wins";
 }
 
 TEST(CauseTableInCode, AFaultIsNotAcknowledgedWhileItLasts) {
@@ -274,7 +274,7 @@ TEST(CauseTableInCode, AFaultIsNotAcknowledgedWhileItLasts) {
   ASSERT_EQ(bench.tick(), Mode::fault);
   bench.input.requests.disarm = true;
   EXPECT_EQ(bench.tick(), Mode::fault) << "there is still pressure";
-  bench.run(200);  // vented by now: nothing may have pressure any more, and nobody can tell
+  bench.run(200);  // vented by now: nothing may have pressure any more, but no sensor confirms it
   bench.input.requests.disarm = true;
   EXPECT_EQ(bench.tick(), Mode::vent);
   bench.run(100);

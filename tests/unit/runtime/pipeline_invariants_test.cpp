@@ -97,7 +97,7 @@ TEST(PipelineInvariants, HoldInEveryTickOfRandomSequences) {
     RandomFaults faults(bench, seed);
     Promises promises(bench, experiment);
     promises.vent_within(vent_ticks);
-    bench.spoil = [&](MocapFrame& frame) { return faults.spoil(frame); };
+    bench.corrupt = [&](MocapFrame& frame) { return faults.corrupt(frame); };
     bench.leak = [&](PressureVector& measured_bar) { faults.leak(measured_bar); };
     const auto tick = [&] {
       faults.before_tick();
@@ -140,7 +140,7 @@ class Watches : public ::testing::Test {
   Experiment experiment = test::paper_arm();
 };
 
-TEST_F(Watches, ValvesThatFollowAreBelieved) {
+TEST_F(Watches, ValvesThatFollowAreAccepted) {
   PipelineBench bench(experiment);
   bend(bench);
   for (int k = 0; k < 2000; ++k) ASSERT_EQ(bench.tick().mode, Mode::active) << k;
@@ -210,7 +210,7 @@ TEST_F(Watches, AnArmThatDoesNotBalanceIsAFaultOnlyWhereThatIsAskedFor) {
     PipelineBench bench(experiment);
     bend(bench);
     for (int k = 0; k < 1000; ++k) ASSERT_EQ(bench.tick().mode, Mode::active) << "it balances";
-    // A chamber of the middle segment bursts, nobody measures pressures: the segment goes straight.
+    // A chamber of the middle segment bursts without measured pressures: the segment goes straight.
     bench.moves = false;
     const int ticks = [&] {
       for (int k = 1; k <= 1000; ++k) {

@@ -38,7 +38,7 @@ class RandomFaults {
         chance(0.002) ? std::uniform_int_distribution<int>(1, 20)(random_) : 0;
   }
 
-  bool spoil(MocapFrame& frame) {
+  bool corrupt(MocapFrame& frame) {
     const std::size_t body = std::uniform_int_distribution<std::size_t>(0, 3)(random_);
     const int axis = std::uniform_int_distribution<int>(0, 2)(random_);
     switch (spell_) {

@@ -1,15 +1,15 @@
 // The daemon's side of LCM over real UDP multicast: ten thousand ticks without a call for memory on
-// the tick's thread, and what it takes for an order. The link's clock is the test's: it advances
-// when the test says so, and no machine is too slow.
+// the tick's thread, and what it accepts as a request. The link's clock is the test's: it
+// advances when the test lets it, so that no machine is too slow.
 #include "softarm/transport/daemon_link.hpp"
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <memory>
 #include <thread>
 
 #include "counted_malloc.hpp"
+#include "own_url.hpp"
 #include "softarm/base/clock.hpp"
 #include "softarm/base/time.hpp"
 #include "softarm/runtime/settings.hpp"
@@ -33,10 +33,9 @@ class DaemonLinkOverUdp : public ::testing::Test {
     settings.reference.phases = {{LiveReference{}, 0.0}};
     transport.bodies = {.base_id = 0, .segment_ids = {1, 2, 3}};
     settings.safety.valve_readback = true;
-    settings.safety.pressure_tolerance_bar = 100.0;  // the messages here follow nobody
+    settings.safety.pressure_tolerance_bar = 100.0;  // the messages here follow no command
     transport.lcm.deadman_channel = "SOFTARM_GO";
-    transport.lcm.url =
-        "udpm://239.255.76.67:" + std::to_string(20000 + getpid() % 12000) + "?ttl=0";
+    transport.lcm.url = test::own_url();
   }
   void SetUp() override {
     try {
@@ -65,7 +64,7 @@ class DaemonLinkOverUdp : public ::testing::Test {
     return message;
   }
 
-  /// Collects until `reached` says so of an input; time stands still meanwhile.
+  /// Collects until `reached` is true of an input; time stands still meanwhile.
   template <class Condition>
   bool collect_until(Condition reached) {
     const std::int64_t end_ns = monotonic_now_ns() + kPatience_ns;
@@ -76,7 +75,7 @@ class DaemonLinkOverUdp : public ::testing::Test {
     return false;
   }
   /// Collects until everything sent so far has been handled: messages come in the order in which
-  /// they were sent, and this sends one more. False where `excluded` says so of an input.
+  /// they were sent, and this sends one more. False where `excluded` is true of an input.
   template <class Condition>
   bool nothing_comes(Condition excluded) {
     const std::int64_t malformed = link->malformed();
@@ -248,7 +247,7 @@ TEST_F(DaemonLinkOverUdp, AnEmergencyStopIsObeyedWhateverItsNumberAndIsNoDisarm)
     EXPECT_FALSE(input.requests.disarm) << "a disarm would acknowledge the stop";
     return input.requests.emergency_stop;
   }));
-  request(11, 77);  // nobody knows what that is
+  request(11, 77);  // not a known request
   ASSERT_TRUE(collect_until([](const TickInput& input) { return input.requests.disarm; }));
 }
 
@@ -296,7 +295,7 @@ TEST_F(DaemonLinkOverUdp, MeasuredPressuresArriveOnceAndOnlyIfTheyMakeSense) {
   }));
 }
 
-TEST_F(DaemonLinkOverUdp, AReferenceThatBeginsAnewIsHeardAfterASilence) {
+TEST_F(DaemonLinkOverUdp, AReferenceThatBeginsAgainIsHeardAfterASilence) {
   curvature_reference_t reference = test::example<curvature_reference_t>(3, 4);
   const auto send = [&](std::int64_t sequence) {
     reference.sequence = sequence;

@@ -1,4 +1,4 @@
-// Valid messages of every type, of any size, with numbers that can be told apart.
+// Valid messages of every type, of any size, with numbers that can be distinguished.
 #pragma once
 
 #include <cstddef>

@@ -315,7 +315,7 @@ TEST_F(Guard, AGapInTimeDegrades) {
   EXPECT_TRUE(reach(ValveState::running));
 }
 
-// Held up, we hear nobody: that is no silence of the one who commands.
+// While the driver is held up it hears nothing: that is not a silence of the commander.
 TEST_F(Guard, WithExplicitArmingWhatWeCouldNotHearIsNoSilence) {
   settings.wait_for_zero = true;
   make();

@@ -61,7 +61,7 @@ SoakRun::SoakRun(const SoakOptions& options)
                       "chambers: a soak watches pressures and valves", "torque");
   if (experiment_.transport.mocap.source != softarm_mocap())
     throw ConfigError(options.config, 0, "daemon.mocap.source",
-                      "softarm, the only frames that a soak can spoil", "another source");
+                      "softarm, the only frames that a soak can corrupt", "another source");
   for (const SoakFault& fault : soak_faults()) counters_.faults.push_back({.name = fault.name});
 }
 
@@ -109,7 +109,7 @@ void SoakRun::measure_after_warm_up(double now_s) {
 
 /// What an operator would do: acknowledge a fault, then arm.
 bool SoakRun::operate_until_active(double patience_s) {
-  arm_.count_active_anew();
+  arm_.reset_active_count();
   const double end_s = passed_s() + patience_s;
   const auto active = [&] { return arm_.active_in_row() >= kSteadyStatuses; };
   while (passed_s() < end_s && stop_requested == 0 && !stop_) {

@@ -2,7 +2,6 @@
 #include "softarm/commissioning/identification/log_record.hpp"
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <cmath>
 #include <fstream>
@@ -10,6 +9,7 @@
 #include "softarm/model/kinematics.hpp"
 #include "softarm/transport/mocap_adapter.hpp"
 #include "softarm/transport/softarm_mocap.hpp"
+#include "test_folder.hpp"
 #include "unit/recording/recorded_log.hpp"
 
 namespace softarm {
@@ -51,7 +51,6 @@ class MotionLog : public ::testing::Test {
     }
     bytes_ = log.bytes;
   }
-  void TearDown() override { std::filesystem::remove(path_); }
 
   LoggedMotion read(const std::string& bytes, LoggedInput input = LoggedInput::commanded) const {
     std::ofstream(path_, std::ios::binary) << bytes;
@@ -75,8 +74,8 @@ class MotionLog : public ::testing::Test {
   Experiment experiment_ =
       load_experiment(std::filesystem::path(SOFTARM_SOURCE_DIR) / "config" / "one_segment.yaml");
   std::string bytes_;
-  std::filesystem::path path_ =
-      std::filesystem::temp_directory_path() / ("softarm_motion_log_" + std::to_string(getpid()));
+  TestFolder folder_;
+  std::filesystem::path path_ = folder_ / "log";
 };
 
 TEST_F(MotionLog, IsReadWhole) {

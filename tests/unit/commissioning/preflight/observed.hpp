@@ -13,7 +13,7 @@ namespace softarm::test {
 inline constexpr std::int64_t kMs = 1'000'000;
 inline constexpr std::int64_t kWall_ns = 1'700'000'000'000'000'000;
 
-/// A hanging arm with four chambers a segment, and what the checks are told of it.
+/// A hanging arm with four chambers a segment, and what the checks are given of it.
 inline Experiment hanging_arm(int segments) {
   Experiment experiment;
   experiment.arm.segments.assign(static_cast<std::size_t>(segments), {0.11, 0.15, 0.626, 0.029});
@@ -103,9 +103,9 @@ inline Observation observed(const Experiment& truth, bool pulses = false) {
   return Observer(truth).observe(pulses);
 }
 
-inline void for_each_body(Observation& seen, const std::function<void(BodyPose&)>& spoil) {
+inline void for_each_body(Observation& seen, const std::function<void(BodyPose&)>& corrupt) {
   for (SeenFrame& frame : seen.frames)
-    for (BodyPose& body : frame.body) spoil(body);
+    for (BodyPose& body : frame.body) corrupt(body);
 }
 
 /// What x, y, z, w makes of numbers that were read as w, x, y, z.
