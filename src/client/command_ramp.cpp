@@ -41,11 +41,15 @@ double CommandRamp::step_s(std::int64_t now_ns) {
   return to_seconds(passed_ns);
 }
 
+void CommandRamp::interrupt() {
+  bar_.setZero();
+  held_up_ = true;
+}
+
 const softarm_messages::pressure_command_t& CommandRamp::next(std::int64_t now_ns) {
   const bool first = sent_ns_ == kNever;
   if (!first && has_expired(message_.time_us, message_.validity_us, now_ns / 1000)) {
-    bar_.setZero();
-    held_up_ = true;
+    interrupt();
   }
   if (first) bar_.setZero();
   next_ns_ = now_ns + period_ns_;

@@ -24,8 +24,9 @@ class CommandRamp {
   void vent(std::int64_t now_ns);
 
   bool due(std::int64_t now_ns) const { return now_ns >= next_ns_; }
-  /// The command to send at `now_ns`. If the one before it has expired, the valves have vented and
-  /// set points begin at zero again.
+  /// The valves have vented: set points begin at zero again.
+  void interrupt();
+  /// The command to send at `now_ns`. If the one before it has expired, the valves have vented.
   const softarm_messages::pressure_command_t& next(std::int64_t now_ns);
 
   const PressureVector& set_points_bar() const { return bar_; }

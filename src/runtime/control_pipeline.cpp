@@ -55,7 +55,7 @@ ControlPipeline::~ControlPipeline() = default;
 
 const TickOutput& ControlPipeline::tick(const TickInput& input) noexcept {
   if (!ticked_) epoch_ns_ = input.now_ns;
-  if (input.command_expired) forget_command();
+  if (input.command_expired || input.paused) forget_command();
   SafetyInput safety;
   validate_and_estimate(input, safety);
 
@@ -64,6 +64,7 @@ const TickOutput& ControlPipeline::tick(const TickInput& input) noexcept {
   predict(input.now_ns, act_ns);
   safety.motion_unknown = !output_.motion.all_valid();
   safety.command_expired = input.command_expired && ticked_;
+  safety.paused = input.paused && ticked_;
   watch(input, safety);
 
   const Mode before = safety_.mode();
@@ -107,7 +108,8 @@ void ControlPipeline::forget_command() noexcept {
 void ControlPipeline::validate_and_estimate(const TickInput& input, SafetyInput& safety) noexcept {
   // After a stop of this process anything may have happened: what is queued is history, not
   // measurement.
-  const bool gap = ticked_ && input.now_ns - previous_ns_ > safety_.thresholds().vent_after_ns;
+  const bool gap =
+      ticked_ && (input.paused || input.now_ns - previous_ns_ > safety_.thresholds().vent_after_ns);
   if (gap) {
     validator_.reset();
     filter_.reset();

@@ -69,7 +69,9 @@ constexpr std::array kCauses{
     Cause{{Reason::pressure_mismatch, Mode::vent, Clearance::good_frames},
           [](const Evidence& e) { return e.input.pressure_mismatch; }},
     Cause{{Reason::time_gap, Mode::vent, Clearance::good_frames},
-          [](const Evidence& e) { return e.tick_gap_ns > e.thresholds.vent_after_ns; }},
+          [](const Evidence& e) {
+            return e.input.paused || e.tick_gap_ns > e.thresholds.vent_after_ns;
+          }},
     Cause{{Reason::command_expired, Mode::vent, Clearance::good_frames},
           [](const Evidence& e) { return e.input.command_expired; }},
     Cause{{Reason::sender_restarted, Mode::vent, Clearance::good_frames},
@@ -168,7 +170,7 @@ SafetyMonitor::SafetyMonitor(const SafetySettings& settings, double control_peri
 void SafetyMonitor::note_stop(const SafetyInput& input) noexcept {
   if (mode_ == Mode::init) return;
   const std::int64_t stopped_ns = input.now_ns - previous_tick_ns_;
-  if (stopped_ns > thresholds_.vent_after_ns || input.command_expired)
+  if (stopped_ns > thresholds_.vent_after_ns || input.paused || input.command_expired)
     deaf_until_ns_ = input.now_ns + kStale_ns;
   if (stopped_ns > thresholds_.valve_silence_ns &&
       input.newest_measurement_ns > listening_since_ns_)

@@ -18,6 +18,8 @@ constexpr int kOtherCapacity = 16;
 /// After a silence of this length a sender of references or requests may restart its sequence
 /// numbers.
 constexpr std::int64_t kNumberForgotten_ns = 500'000'000;
+/// A report that the valves are vented counts for so long.
+constexpr std::int64_t kVentedFor_ns = 1'000'000'000;
 
 }  // namespace
 
@@ -50,7 +52,9 @@ DaemonLink::DaemonLink(const PipelineSettings& settings, const TransportSettings
                   [this](const auto& packet) { take_reference(packet); });
   node_.subscribe(lcm_.operator_channel, kOtherCapacity,
                   [this](const auto& packet) { take_operator(packet); });
-  if (settings.safety.valve_readback)
+  // Whether valves have vented is heard even where their pressures are not judged.
+  valve_readback_ = settings.safety.valve_readback;
+  if (valve_readback_ || !shadow)
     node_.subscribe(lcm_.measurement_channel, kOtherCapacity,
                     [this](const auto& packet) { take_measurement(packet); });
   if (!lcm_.deadman_channel.empty())
@@ -63,11 +67,15 @@ TickInput DaemonLink::collect(std::int64_t now_ns) noexcept {
   frame_count_ = 0;
   input_ = {};
   input_.now_ns = now_ns;
+  input_.paused = pause_.paused() || paused_while_deciding_;
+  paused_while_deciding_ = false;
+  if (input_.paused) sent_us_ = kNever;  // its validity has passed, on whatever clock
   input_.command_expired = command_expired(now_ns / 1000);
   node_.drain(static_cast<int>(mocap_.channels().size()) * kFrameCapacity + 4 * kOtherCapacity);
   if (frame_count_ < frames_.size() && mocap_.overdue(now_ns, frames_[frame_count_]))
     ++frame_count_;
   input_.frames = {frames_.data(), frame_count_};
+  input_.command_expired |= valves_vented_ && age_ns(now_ns, valves_heard_ns_) < kVentedFor_ns;
   input_.newest_measurement_ns = newest_measurement_ns_;
   input_.newest_go_ns = newest_go_ns_;
   return input_;
@@ -129,10 +137,23 @@ void DaemonLink::take_measurement(const ReceivedMessage& packet) noexcept {
     ++malformed_;
     return;
   }
+  if (messages_.pressure_command.shadow == 0) take_valves_report();
+  if (!valve_readback_) return;
   newest_measurement_ns_ = arrival_ns(packet);
   std::copy(measured.begin(), measured.end(), measured_bar_.begin());
   // Measured pressures respond to the daemon that commands the valves, not to a shadow.
   if (messages_.pressure_command.shadow == 0) input_.measured_bar = &measured_bar_;
+}
+
+/// Valves that hold no command of ours, or have held none for a while since their last report, have
+/// vented: our command was lost, late, or refused, whatever we believe.
+void DaemonLink::take_valves_report() noexcept {
+  const bool fell = valves_heard_ns_ != kNever && measurement_message_.expired != valves_expired_;
+  valves_expired_ = measurement_message_.expired;
+  valves_vented_ = measurement_message_.sequence < 0;
+  valves_heard_ns_ = now_ns_;
+  granted_us_ = std::max(measurement_message_.validity_us, 0);
+  input_.command_expired |= fell || valves_vented_;
 }
 
 void DaemonLink::take_go(const ReceivedMessage& packet) noexcept {
@@ -149,6 +170,10 @@ void DaemonLink::take_go(const ReceivedMessage& packet) noexcept {
 void DaemonLink::publish_command(std::int64_t now_ns, const TickOutput& output) noexcept {
   messages_.set_command(++commands_, output);
   const std::int64_t now_us = now_ns / 1000;
+  if (pause_.paused()) {
+    paused_while_deciding_ = true;
+    sent_us_ = kNever;
+  }
   if (command_expired(now_us) && !input_.command_expired) {
     ++unsent_;
     return;
@@ -162,7 +187,12 @@ void DaemonLink::publish_command(std::int64_t now_ns, const TickOutput& output) 
 }
 
 bool DaemonLink::command_expired(std::int64_t now_us) const noexcept {
-  return sent_us_ == kNever || now_us - sent_us_ >= messages_.pressure_command.validity_us;
+  return sent_us_ == kNever || now_us - sent_us_ >= held_us();
+}
+
+std::int32_t DaemonLink::held_us() const noexcept {
+  const std::int32_t asked_us = messages_.pressure_command.validity_us;
+  return granted_us_ > 0 ? std::min(asked_us, granted_us_) : asked_us;
 }
 
 void DaemonLink::publish_status(std::int64_t now_ns, const ControlPipeline& pipeline,

@@ -113,4 +113,10 @@ std::string lock_name(const std::string& channel, const std::string& url) {
   return channel + " on " + network;
 }
 
+bool is_local(const std::string& url) {
+  const std::size_t ttl = url.find("ttl=");
+  return url.starts_with("udpm://") &&
+         (ttl == std::string::npos || std::strtol(url.c_str() + ttl + 4, nullptr, 0) == 0);
+}
+
 }  // namespace softarm

@@ -80,7 +80,7 @@ bool decode(std::span<const std::byte> bytes,
 
 bool decode(std::span<const std::byte> bytes,
             softarm_messages::pressure_measurement_t& message) noexcept {
-  return decode_list(bytes, 8 + 8, 4, kMaxChambers, message);
+  return decode_list(bytes, 8 + 8 + 4 + 4 + 1, 4, kMaxChambers, message);
 }
 
 bool decode(std::span<const std::byte> bytes,
@@ -125,7 +125,7 @@ bool decode(std::span<const std::byte> bytes, softarm_messages::timing_t& messag
 }
 
 bool decode(std::span<const std::byte> bytes, softarm_messages::tick_record_t& message) noexcept {
-  constexpr std::size_t kCounts = kHash + 6 * 8 + 4 + 6;  // numbers and flags come first
+  constexpr std::size_t kCounts = kHash + 6 * 8 + 4 + 7;  // numbers and flags come first
   const int chambers = bounded(length16_at(bytes, kCounts), kMaxChambers);
   const int dimension = bounded(length16_at(bytes, kCounts + 2), 2 * kMaxSegments);
   const int frames = bounded(length16_at(bytes, kCounts + 4), TickRecorder::kMostFrames);

@@ -103,7 +103,7 @@ bool is_intact(std::span<const std::byte> encoded) noexcept {
 void to_record(const TickInput& input, tick_record_t& record) {
   // A new field of TickInput breaks the build here: it must be added to lcmtypes/tick_record_t.lcm,
   // to this function, to RecordedInput::from and to the size that decode() checks.
-  const auto& [now_ns, frames, reference, requests, command_expired, consecutive_overruns,
+  const auto& [now_ns, frames, reference, requests, command_expired, paused, consecutive_overruns,
                newest_measurement_ns, measured_bar, newest_go_ns] = input;
   const auto& [arm, disarm, emergency_stop, shutdown] = requests;
   record.now_ns = now_ns;
@@ -123,6 +123,7 @@ void to_record(const TickInput& input, tick_record_t& record) {
   record.emergency_stop = emergency_stop ? 1 : 0;
   record.shutdown = shutdown ? 1 : 0;
   record.command_expired = command_expired ? 1 : 0;
+  record.paused = paused ? 1 : 0;
   record.consecutive_overruns = consecutive_overruns;
   record.newest_measurement_ns = newest_measurement_ns;
   record.newest_go_ns = newest_go_ns;
@@ -154,6 +155,7 @@ const TickInput& RecordedInput::from(const tick_record_t& record) {
                      .emergency_stop = record.emergency_stop != 0,
                      .shutdown = record.shutdown != 0};
   input_.command_expired = record.command_expired != 0;
+  input_.paused = record.paused != 0;
   input_.consecutive_overruns = record.consecutive_overruns;
   input_.newest_measurement_ns = record.newest_measurement_ns;
   input_.newest_go_ns = record.newest_go_ns;

@@ -38,6 +38,7 @@ struct TickInput {
   const LiveReferenceInput* reference = nullptr;  ///< the newest, if one came
   OperatorRequests requests = {};
   bool command_expired = false;  ///< the last one sent has expired: the valves have vented
+  bool paused = false;           ///< the clock of `now_ns` stood still since the last tick
   int consecutive_overruns = 0;  ///< ticks missed in a row; zero where they are not to be judged
   /// Arrival of the newest pressure measurement, where the valves publish them.
   std::int64_t newest_measurement_ns = kNever;

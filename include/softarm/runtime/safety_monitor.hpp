@@ -105,6 +105,7 @@ struct SafetyInput {
   std::int64_t newest_measurement_ns = kNever;  ///< of the valves' read-back
   bool pressure_mismatch = false;               ///< measured pressures do not follow the commands
   bool curvature_mismatch = false;              ///< the arm is not where its pressures would put it
+  bool paused = false;                          ///< the clock stood still since the last tick
   bool command_expired = false;        ///< the last command expired: the valves have vented
   bool deadman_used = false;           ///< there is a dead-man input
   std::int64_t newest_go_ns = kNever;  ///< arrival of the newest "go"

@@ -10,6 +10,7 @@
 #include <softarm_messages/timing_t.hpp>
 #include <vector>
 
+#include "softarm/base/clock.hpp"
 #include "softarm/base/histogram.hpp"
 #include "softarm/runtime/control_pipeline.hpp"
 #include "softarm/runtime/settings.hpp"
@@ -61,6 +62,10 @@ class DaemonLink {
   /// a run, when no tick follows.
   bool repeat_record() noexcept;
 
+  /// How long the valves hold a command of ours (us): its validity, or less where they grant less.
+  std::int32_t held_us() const noexcept;
+  /// The validity that commands ask for (us).
+  std::int32_t asked_us() const noexcept { return messages_.pressure_command.validity_us; }
   /// Messages that could not be decoded.
   std::int64_t malformed() const noexcept { return malformed_; }
   /// Publications that failed, and commands that were too late to send.
@@ -71,6 +76,7 @@ class DaemonLink {
   void take_reference(const ReceivedMessage& packet) noexcept;
   void take_operator(const ReceivedMessage& packet) noexcept;
   void take_measurement(const ReceivedMessage& packet) noexcept;
+  void take_valves_report() noexcept;
   void take_go(const ReceivedMessage& packet) noexcept;
   std::int64_t arrival_ns(const ReceivedMessage& packet) const noexcept;
   bool command_expired(std::int64_t now_us) const noexcept;
@@ -98,6 +104,13 @@ class DaemonLink {
   std::int64_t operator_sequence_;
   std::int64_t commands_ = 0;
   std::int64_t sent_us_ = kNever;  ///< time in the newest command
+  PauseWatch pause_;
+  bool paused_while_deciding_ = false;
+  bool valve_readback_ = false;
+  // What the valves have reported.
+  bool valves_vented_ = false;
+  std::int32_t valves_expired_ = 0, granted_us_ = 0;
+  std::int64_t valves_heard_ns_ = kNever;
   std::int64_t malformed_ = 0;
   std::int64_t unsent_ = 0;
 

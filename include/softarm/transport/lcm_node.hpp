@@ -86,4 +86,8 @@ class LcmNode {
 /// spelling of group and port make it a different network.
 std::string lock_name(const std::string& channel, const std::string& url);
 
+/// Whether messages sent to `url` stay on this machine, where all read the same monotonic clock:
+/// UDP multicast whose ttl is 0, LCM's default.
+bool is_local(const std::string& url);
+
 }  // namespace softarm

@@ -52,6 +52,17 @@ void run(DaemonLoop& loop, LineLog& log, ServiceNotifier& service) {
     refused = total;
     refused_reported_ns = now_ns;
   };
+  std::int32_t held_us = loop.link().asked_us();
+  const auto report_validity = [&] {
+    if (loop.link().held_us() == held_us) return;
+    held_us = loop.link().held_us();
+    if (held_us < loop.link().asked_us())
+      log.add(
+          "commands are valid for {:.3g} s (daemon.lcm.command_validity_s), but the valve side "
+          "lets "
+          "them expire after {:.3g} s",
+          1e-6 * loop.link().asked_us(), 1e-6 * held_us);
+  };
   loop.run([] { return stop_requested != 0; },
            [&](const DaemonLoop::Report& report) {
              const TickOutput& output = loop.pipeline().output();
@@ -62,6 +73,7 @@ void run(DaemonLoop& loop, LineLog& log, ServiceNotifier& service) {
                        name(reason));
              }
              report_refused(report.woken_ns);
+             report_validity();
              service.report(report.woken_ns, {.state = name(mode),
                                               .reason = name(reason),
                                               .on_time = report.on_time,

@@ -33,7 +33,7 @@ std::vector<LengthField> length_fields(const Message&) {
 std::vector<LengthField> length_fields(const mocap_frame_t&) { return {{24, 2}}; }
 std::vector<LengthField> length_fields(const pressure_command_t&) { return {{29, 2}}; }
 std::vector<LengthField> length_fields(const torque_command_t&) { return {{29, 2}}; }
-std::vector<LengthField> length_fields(const pressure_measurement_t&) { return {{24, 2}}; }
+std::vector<LengthField> length_fields(const pressure_measurement_t&) { return {{33, 2}}; }
 std::vector<LengthField> length_fields(const curvature_reference_t&) { return {{16, 2}}; }
 std::vector<LengthField> length_fields(const valves_status_t&) { return {{64, 2}}; }
 std::vector<LengthField> length_fields(const plant_state_t&) { return {{17, 2}, {19, 2}}; }
@@ -41,8 +41,8 @@ std::vector<LengthField> length_fields(const tick_record_t& record) {
   const auto lists = static_cast<std::size_t>(record.num_chambers + 3 * record.dimension);
   const auto bodies = static_cast<std::size_t>(record.frames.at(0).num_bodies);
   const auto measured = static_cast<std::size_t>(record.num_measured);
-  const std::size_t frame = 74 + 8 * lists + 4 * measured;
-  return {{66, 2}, {68, 2}, {70, 2}, {72, 2}, {frame + 16, 2}, {frame + 18 + 61 * bodies, 4}};
+  const std::size_t frame = 75 + 8 * lists + 4 * measured;
+  return {{67, 2}, {69, 2}, {71, 2}, {73, 2}, {frame + 16, 2}, {frame + 18 + 61 * bodies, 4}};
 }
 std::vector<LengthField> length_fields(const controller_status_t& status) {
   const std::size_t counts = 48 + 4 + status.version.size() + 1 + 4 + 4 + 24;
