@@ -43,6 +43,7 @@ Experiment heavy(int segments, ObserverKind observer, double max_pressure_bar) {
                           0.0}};
   it.estimation.observer = observer;
   it.safety.frame_latency_s = 0.005;
+  it.safety.good_frames = 5;  // callgrind is slow
   it.safety.valve_readback = true;
   it.safety.pressure_tolerance_bar = 10.0;  // the bench's arm is where it is asked to be
   it.safety.curvature_residual_nm = 1e3;
@@ -109,7 +110,7 @@ void play(const std::function<void(const std::string& name, const std::function<
         if (bench->run_to(Mode::active) < 0)
           throw std::runtime_error(
               fmt::format("not ACTIVE: {}", name(bench->pipeline.output().reason)));
-        bench->run(50);
+        bench->run(10);
         bench->publishing = false;
         for (int k = 0; k < 6; ++k) {
           scene.before(*bench);

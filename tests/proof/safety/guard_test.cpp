@@ -398,7 +398,6 @@ class Exploration {
           visit(k, {static_cast<Event>(event), sent});
       for (const Sent sent : {Sent::older, Sent::foreign, Sent::shadow, Sent::malformed})
         visit(k, {Event::none, sent});
-      if (k % 20000 == 0) fprintf(stderr, "%zu of %zu\n", k, visits_.size());
       get_back(k);
     }
     count_.states = visits_.size();
