@@ -106,6 +106,8 @@ int serve(const std::string& program, const std::string& path) {
                   valves.order.size(), valves.backend, backend->address(), valves.rate_hz));
   if (const std::string warning = backend->warning(); !warning.empty())
     say(fmt::format("{}: warning: {}\n", program, warning));
+  if (const std::string warning = network_warning(lcm.url); !warning.empty())
+    say(fmt::format("{}: warning: {}\n", program, warning));
   ValveDriver driver(guard_settings(experiment), std::move(backend));
   if (drive(program, experiment, driver)) return kExitOk;
   print_error(program,

@@ -57,14 +57,8 @@ const softarm_messages::pressure_command_t& CommandRamp::next(std::int64_t now_n
   ++message_.sequence;
   message_.time_us = now_ns / 1000;
   message_.pressure_bar.assign(bar_.begin(), bar_.end());
-  sent_us_[static_cast<std::size_t>(message_.sequence) % sent_us_.size()] = message_.time_us;
+  sent_.add(message_.sequence, message_.time_us);
   return message_;
-}
-
-bool CommandRamp::is_ours(const ChamberCommand& command) const {
-  const auto place = static_cast<std::size_t>(command.sequence) % sent_us_.size();
-  return command.sequence > 0 && command.sequence <= message_.sequence &&
-         sent_us_[place] == command.time_us;
 }
 
 }  // namespace softarm

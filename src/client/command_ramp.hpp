@@ -1,13 +1,13 @@
 // Which set points are sent next, and when: limits, ramp and expiry, with time as an argument.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <softarm_messages/pressure_command_t.hpp>
 
 #include "softarm/actuation/pressure_ramps.hpp"
 #include "softarm/base/time.hpp"
 #include "softarm/transport/arm_messages.hpp"
+#include "softarm/transport/sent_commands.hpp"
 
 namespace softarm {
 
@@ -35,7 +35,9 @@ class CommandRamp {
   /// Whether some command was sent after the one before it had expired.
   bool held_up() const { return held_up_; }
   /// Whether this is one of the latest commands that `next` returned.
-  bool is_ours(const ChamberCommand& command) const;
+  bool is_ours(const ChamberCommand& command) const {
+    return sent_.contains(command.sequence, command.time_us);
+  }
 
  private:
   double step_s(std::int64_t now_ns);
@@ -46,7 +48,7 @@ class CommandRamp {
   std::int64_t period_ns_, updated_ns_ = 0, next_ns_ = 0, sent_ns_ = kNever;
   bool held_up_ = false;
   softarm_messages::pressure_command_t message_;
-  std::array<std::int64_t, 1024> sent_us_{};  ///< ring of the latest, by sequence number
+  SentCommands sent_;
 };
 
 }  // namespace softarm

@@ -43,6 +43,8 @@ ControlPipeline::ControlPipeline(const PipelineSettings& settings)
       ramps_(settings.actuation),
       pressure_watch_(settings.safety, allocator_.chambers()),
       curvature_watch_(settings.safety, settings.arm),
+      oscillation_watch_(settings.safety, period_s_, settings.arm.dof()),
+      length_watch_(settings.safety, settings.arm),
       previous_bar_(PressureVector::Zero(allocator_.chambers())),
       previous_tau_nm_(SegmentVector::Zero(settings.arm.dof())),
       commanded_tau_nm_(previous_tau_nm_),
@@ -81,6 +83,9 @@ const TickOutput& ControlPipeline::tick(const TickInput& input) noexcept {
   if (mode == Mode::active) {
     reference_.advance(seconds(act_ns));
     control(act_ns);
+    oscillation_watch_.judge(window_.now.u, output_.motion.u_rad);
+  } else {
+    oscillation_watch_.reset();
   }
   limit(mode);
   if (observer_) {
@@ -116,6 +121,7 @@ void ControlPipeline::validate_and_estimate(const TickInput& input, SafetyInput&
     if (observer_) observer_->reset();
     pressure_watch_.reset();
     curvature_watch_.reset();
+    length_watch_.reset();
   }
   const std::int64_t max_latency_ns = to_ns(settings_.safety.max_latency_s);
   for (const MocapFrame& frame : input.frames) {
@@ -156,6 +162,7 @@ void ControlPipeline::validate_and_estimate(const TickInput& input, SafetyInput&
   safety.newest_measurement_ns = input.newest_measurement_ns;
   safety.deadman_used = settings_.safety.deadman;
   safety.newest_go_ns = input.newest_go_ns;
+  safety.newest_foreign_ns = input.newest_foreign_ns;
   safety.requests = input.requests;
   output_.soft_limit = safety.soft_limit_exceeded;
   output_.frame_age_s = newest_capture_ns_ == kNever
@@ -166,7 +173,12 @@ void ControlPipeline::validate_and_estimate(const TickInput& input, SafetyInput&
 void ControlPipeline::watch(const TickInput& input, SafetyInput& safety) noexcept {
   if (input.measured_bar != nullptr && input.measured_bar->size() == previous_bar_.size())
     pressure_watch_.measure(*input.measured_bar);
+  safety.oscillation = oscillation_watch_.oscillates();
   safety.pressure_mismatch = settings_.safety.valve_readback && pressure_watch_.out_of_tolerance();
+  // An arm that is not pressurised yet can wait for a second look.
+  const bool waiting = safety_.mode() == Mode::wait_frames;
+  safety.length_mismatch = length_watch_.out_of_tolerance() || (waiting && length_watch_.beyond());
+  output_.length_warning = length_watch_.warns();
   if (!curvature_watch_.used()) return;
   // What is judged is the balance of an arm that is observed and commanded.
   const bool under_control = safety_.mode() == Mode::active || safety_.mode() == Mode::hold;
@@ -186,6 +198,7 @@ void ControlPipeline::use_frame(const MocapFrame& frame) noexcept {
       seen_ns_[static_cast<std::size_t>(i)] = frame.capture_ns;
   if (validator_.identical_in_row() == 0) pressure_at_last_motion_bar_ = previous_bar_;
   newest_capture_ns_ = frame.capture_ns;
+  length_watch_.judge(frame.capture_ns, estimate);
   output_.frame_number = frame.frame_number;
   const BodyPose& tip = frame.body[static_cast<std::size_t>(settings_.arm.size())];
   if (tip.valid) reference_.measure_tip(seconds(frame.capture_ns), tip.position_m);

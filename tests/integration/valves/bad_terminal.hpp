@@ -1,4 +1,4 @@
-// A valve terminal on Modbus TCP that misbehaves on request, with valves of its own behind it.
+// A valve terminal on Modbus TCP that misbehaves on request, with simulated valves behind it.
 #pragma once
 
 #include <algorithm>

@@ -1,5 +1,5 @@
-// softarm-valves before a terminal that refuses, ignores or loses what it is told, or obeys another
-// master too. What must hold: the arm vents, nothing keeps it from venting, and nobody is told that
+// softarm-valves before a terminal that refuses, ignores or loses its commands, or obeys another
+// master too. What must hold: the arm vents, nothing keeps it from venting, and nothing reports that
 // it has vented before its measured pressure fell.
 #include "integration/valves/bad_terminal.hpp"
 

@@ -50,7 +50,7 @@ class Senders : public ValvesProgram, public ::testing::WithParamInterface<bool>
     std::ofstream(config_, std::ios::app)
         << "actuation: {slew_bar_per_s: " << kSlew_bar_per_s << "}\n";
   }
-  /// As another program with numbers and a clock of its own.
+  /// As another program with separate numbers and a separate clock.
   void intrude(double bar) {
     softarm_messages::pressure_command_t theirs = sent_;
     theirs.sequence += 1'000'000;

@@ -76,9 +76,9 @@ TEST_F(Commanding, BeginsAtZeroWhereTheValvesReportThatTheyHaveVented) {
   while (client->set_points_bar()[0] < 0.5) client->command_chambers(wanted);
   ++measurement.expired;
   measurement.pressure_bar[0] += 0.5F;
-  const double told = static_cast<double>(measurement.pressure_bar[0]);
+  const double reported = static_cast<double>(measurement.pressure_bar[0]);
   peer->publish(lcm.measurement_channel, measurement);
-  ASSERT_TRUE(wait_for([&] { return client->measured()->bar[0] == told; }));
+  ASSERT_TRUE(wait_for([&] { return client->measured()->bar[0] == reported; }));
   EXPECT_EQ(client->set_points_bar()[0], 0.0);
   EXPECT_TRUE(client->held_up());
 }
