@@ -8,7 +8,7 @@
 
 namespace softarm::test {
 inline std::atomic<long> allocations{0};
-/// Of the calling thread alone, for programs whose libraries keep threads of their own.
+/// Of the calling thread alone, for programs whose libraries have their own threads.
 inline thread_local long thread_allocations = 0;
 inline thread_local long thread_releases = 0;
 inline void count_allocation() noexcept {

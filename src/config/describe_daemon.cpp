@@ -55,6 +55,11 @@ static void describe(Keys& key, SafetySettings& it) {
   KEY(oscillation_lowest_hz, above(0, 1e3), "slower ones do not count");
   KEY(oscillation_part, from(0, 100),
       "of what the reference itself does meanwhile: a smaller error follows the reference");
+  KEY(length_warning, from(0, 100),
+      "a segment's measured length off arm.length_m by more, over that: the status reports it; 0: "
+      "not checked");
+  KEY(length_fault, from(0, 100), "the same: FAULT; 0: not checked");
+  KEY(length_settling_s, above(0, 100), "for so long without interruption");
   KEY(deadman_timeout_s, above(0, 10), "without a go on lcm.deadman_channel: VENT");
 }
 
@@ -93,20 +98,21 @@ static void describe_bodies(Keys& key, BodySettings& it, bool named) {
     it.segment_ids.resize(n);
     std::iota(it.segment_ids.begin(), it.segment_ids.end(), 1);
   }
-  if (it.segment_plates.empty()) {
-    it.segment_plates.resize(n);
-    if (named) it.base_plate.name = "base";
+  if (it.segment_marker_frames.empty()) {
+    it.segment_marker_frames.resize(n);
+    if (named) it.base_marker_frame.name = "base";
     for (std::size_t i = 0; i < n && named; ++i)
-      it.segment_plates[i].name = "segment_" + std::to_string(i + 1);
+      it.segment_marker_frames[i].name = "segment_" + std::to_string(i + 1);
   }
   KEY(base_id, id.or_word("fixed", -1), "body of the base, or fixed: arm.base holds");
   KEY(segment_ids, id.each(),
       "bodies of the segments' ends, base to tip (rigid_transform: names instead); left out: 1, 2, "
       "...");
   key.section({"base_plate", "S_0 on the body of the base; softarm calibrate finds it"},
-              [&] { describe_frame(key, it.base_plate, named); });
+              [&] { describe_frame(key, it.base_marker_frame, named); });
   key.one_or_each({"segment_plates", "S_i on the segments' bodies, of all or a list; likewise"},
-                  it.segment_plates, [&](auto& frame) { describe_frame(key, frame, named); });
+                  it.segment_marker_frames,
+                  [&](auto& frame) { describe_frame(key, frame, named); });
 }
 
 static void describe(Keys& key, RealtimeSettings& it) {

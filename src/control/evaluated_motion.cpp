@@ -18,12 +18,14 @@ void to_polar(const Eigen::VectorXd& q, Eigen::Matrix3Xd& jacobian) {
 EvaluatedMotion direct_motion(const EvalCase& in, DynamicsWorkspace& workspace,
                               const Eigen::VectorXd& u, const Eigen::VectorXd& velocity) {
   const ArmParameters& arm = in.arm;
-  EvaluatedMotion m(arm.size());
+  EvaluatedMotion m(arm);
   forward_kinematics(arm, u, m.ends);
   for (std::size_t i = 0; i < m.local.size(); ++i) {
-    const Eigen::Vector2d one = u.segment<2>(2 * static_cast<Eigen::Index>(i));
+    const Eigen::Index at = arm.segment_dof() * static_cast<Eigen::Index>(i);
+    const Eigen::Vector2d one = u.segment<2>(at);
+    const double elongation = arm.extensible ? u(at + 2) : 0.0;
     m.local[i].topLeftCorner<3, 3>() = segment_rotation(one);
-    m.local[i].topRightCorner<3, 1>() = segment_tip(arm.segments[i].length_m, one);
+    m.local[i].topRightCorner<3, 1>() = segment_tip(arm.segments[i].length_m + elongation, one);
   }
   mass_centres(arm, u, m.centres);
   tip_jacobians(arm, u, velocity, m.J, m.J_rate);
@@ -43,7 +45,7 @@ EvaluatedMotion direct_motion(const EvalCase& in, DynamicsWorkspace& workspace,
 }
 
 EvaluatedMotion augmented_motion(const EvalCase& in, AugmentedRobot& robot) {
-  EvaluatedMotion m(in.arm.size());
+  EvaluatedMotion m(in.arm);
   robot.update(in.q, in.qd);
   for (int i = 0; i < in.arm.size(); ++i) {
     const auto at = static_cast<std::size_t>(i);

@@ -12,16 +12,16 @@ namespace softarm {
 
 /// Poses, Jacobians and dynamics of the arm by one route, in the case's coordinates.
 struct EvaluatedMotion {
-  explicit EvaluatedMotion(int n)
-      : ends(static_cast<std::size_t>(n)),
-        local(static_cast<std::size_t>(n), Eigen::MatrixXd::Identity(4, 4)),
-        centres(3, n),
-        J(3, 2 * n),
-        J_rate(3, 2 * n),
-        J_angular(3, 2 * n),
-        B(2 * n, 2 * n),
-        C(2 * n, 2 * n),
-        G(2 * n) {}
+  explicit EvaluatedMotion(const ArmParameters& arm)
+      : ends(arm.segments.size()),
+        local(arm.segments.size(), Eigen::MatrixXd::Identity(4, 4)),
+        centres(3, arm.size()),
+        J(3, arm.dof()),
+        J_rate(3, arm.dof()),
+        J_angular(3, arm.dof()),
+        B(arm.dof(), arm.dof()),
+        C(arm.dof(), arm.dof()),
+        G(arm.dof()) {}
 
   std::vector<Eigen::Isometry3d> ends;  ///< world pose of every segment's end
   std::vector<Eigen::MatrixXd> local;   ///< the same relative to the segment's start

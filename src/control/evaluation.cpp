@@ -1,6 +1,7 @@
 #include "softarm/control/evaluation.hpp"
 
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 #include <utility>
 
@@ -28,7 +29,7 @@ class Evaluation {
         workspace_(input.arm),
         u_(input.q),
         velocity_(input.qd),
-        motion_(input.arm.size()) {
+        motion_(input.arm) {
     if (case_.polar) {
       polar_to_u(case_.q, u_);
       polar_velocity_to_u(case_.q, case_.qd, velocity_);
@@ -49,6 +50,7 @@ class Evaluation {
     if (case_.control) control(*case_.control);
     if (case_.tau_actuation) forward(*case_.tau_actuation);
     if (case_.inverse_kinematics) inverse(*case_.inverse_kinematics);
+    if (case_.chambers) chambers(*case_.chambers);
     return std::move(terms_);
   }
 
@@ -68,7 +70,8 @@ class Evaluation {
     if (!case_.polar) {
       throw std::invalid_argument("case " + case_.id +
                                   ": the augmented robot is in polar coordinates, expected coords "
-                                  "polar, got cartesian_u");
+                                  "polar, got " +
+                                  (arm_.extensible ? "cartesian_ue" : "cartesian_u"));
     }
     AugmentedRobot robot(arm_);
     motion_ = augmented_motion(case_, robot);
@@ -93,24 +96,31 @@ class Evaluation {
   }
 
   void impedance() {
-    K_.resize(dof_);
-    D_.resize(dof_);
-    for (int i = 0; i < arm_.size(); ++i) {
-      const SegmentParameters& segment = arm_.segments[static_cast<std::size_t>(i)];
-      const double k = segment.stiffness_nm_per_rad, beta = segment.damping_nms_per_rad;
-      const double theta = case_.q(2 * i + 1);
-      K_.segment<2>(2 * i) << (case_.polar ? 0.0 : k), k;
-      D_.segment<2>(2 * i) << (case_.polar ? beta * theta * theta : beta), beta;
+    K_ = Eigen::VectorXd::Zero(dof_);
+    D_ = K_;
+    const Eigen::VectorXd zero = K_, one = Eigen::VectorXd::Ones(dof_);
+    add_impedance(arm_, one, zero, K_);
+    add_impedance(arm_, zero, one, D_);
+    for (int i = 0; case_.polar && i < dof_; i += 2) {
+      const double theta = case_.q(i + 1);
+      K_(i) = 0.0;
+      D_(i) = D_(i) * theta * theta;
     }
     add("K", Shape::matrix, Eigen::MatrixXd(K_.asDiagonal()));
     add("D", Shape::matrix, Eigen::MatrixXd(D_.asDiagonal()));
   }
 
+  /// Force on e for unit N; the couple of (15) has none.
+  static double axial(ActuationModel model) {
+    return model == ActuationModel::chamber ? 1.0 : std::numeric_limits<double>::quiet_NaN();
+  }
+
   Eigen::MatrixXd input_matrix(ActuationModel model) const {
     Eigen::MatrixXd A = Eigen::MatrixXd::Zero(dof_, dof_);
-    for (int i = 0; i < dof_; i += 2) {
+    for (int i = 0; i < dof_; i += arm_.segment_dof()) {
       A.block<2, 2>(i, i) = case_.polar ? polar_actuation_matrix(model, case_.q.segment<2>(i))
                                         : actuation_matrix(model, u_.segment<2>(i));
+      if (arm_.extensible) A(i + 2, i + 2) = axial(model);
     }
     return A;
   }
@@ -134,9 +144,10 @@ class Evaluation {
   /// A^-1 tau; no value where A of any segment is singular.
   void add_actuation_torque(const char* name, ActuationModel model, const Eigen::VectorXd& tau) {
     Eigen::VectorXd result(dof_);
-    for (int i = 0; i < dof_; i += 2) {
+    for (int i = 0; i < dof_; i += arm_.segment_dof()) {
       const Eigen::Vector2d q = case_.q.segment<2>(i), force = tau.segment<2>(i);
       if (singular(model, q)) return add_missing(name);
+      if (arm_.extensible) result(i + 2) = axial(model) * tau(i + 2);
       if (case_.polar) {
         const double r = model == ActuationModel::couple ? std::sin(q.y()) : q.y();
         const double c = std::cos(q.x()), s = std::sin(q.x());
@@ -180,6 +191,7 @@ class Evaluation {
     arm_.actuation = model;
     Eigen::VectorXd force(dof_), acceleration(dof_);
     apply_actuation(arm_, u_, tau_actuation, force);
+    if (case_.tip_force_n) add_tip_force(arm_, u_, *case_.tip_force_n, force);
     const bool solved = forward_dynamics(arm_, workspace_, u_, velocity_, force, acceleration);
     result = acceleration;
     if (case_.polar) u_acceleration_to_polar(case_.q, case_.qd, acceleration, result);
@@ -188,8 +200,9 @@ class Evaluation {
 
   bool accelerate_in_polar(ActuationModel model, const Eigen::VectorXd& tau_actuation,
                            Eigen::VectorXd& result) {
-    const Eigen::VectorXd force = input_matrix(model) * tau_actuation - motion_.C * case_.qd -
-                                  D_.cwiseProduct(case_.qd) - motion_.G - K_.cwiseProduct(case_.q);
+    Eigen::VectorXd force = input_matrix(model) * tau_actuation - motion_.C * case_.qd -
+                            D_.cwiseProduct(case_.qd) - motion_.G - K_.cwiseProduct(case_.q);
+    if (case_.tip_force_n) force += motion_.J.transpose() * *case_.tip_force_n;
     return solve_inertia(workspace_, motion_.B, force, result);
   }
 
@@ -204,6 +217,26 @@ class Evaluation {
       add_missing("qbar_dot");
       add_missing("qbar_ddot");
     }
+  }
+
+  void chambers(const EvalChambers& in) {
+    Eigen::VectorXd force(dof_);
+    std::vector<Eigen::MatrixXd> lengths;
+    for (std::size_t i = 0; i < in.geometry.size(); ++i) {
+      const ChamberGeometry& geometry = in.geometry[i];
+      const Eigen::Vector3d q = u_.segment<3>(3 * static_cast<Eigen::Index>(i));
+      const double length = arm_.segments[i].length_m + q.z();
+      force.segment<3>(3 * static_cast<Eigen::Index>(i)) =
+          chamber_force(geometry, in.pressures_bar[i]);
+      Eigen::VectorXd fibres(static_cast<Eigen::Index>(geometry.angles_rad.size()));
+      for (std::size_t j = 0; j < geometry.angles_rad.size(); ++j) {
+        fibres(static_cast<Eigen::Index>(j)) =
+            fibre_length(length, q.head<2>(), geometry.offset_m, geometry.angles_rad[j]);
+      }
+      lengths.emplace_back(fibres);
+    }
+    add("chambers/generalized_force", Shape::vector, force);
+    add("chambers/length", Shape::vectors, std::move(lengths));
   }
 
   const EvalCase& case_;

@@ -11,8 +11,8 @@
 namespace softarm {
 namespace {
 
-// Frames may overtake one another by a few numbers; a number further back is a sender that began
-// anew.
+// Frames may overtake one another by a few numbers; a number further back is a sender that
+// restarted.
 constexpr std::uint64_t kMaxReorder = 16;
 // So is a run of old numbers that counts up among itself: a sender that died before its 17th frame.
 constexpr int kRestartRun = 3;

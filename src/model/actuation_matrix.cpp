@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "model/entire_series.hpp"
 
@@ -19,6 +20,11 @@ double accurate_sinc(double x, double y) noexcept {
   const double theta = std::sqrt(s);
   const double correction = (lost - std::fma(theta, theta, -s)) / (2.0 * theta);
   return (std::sin(theta) + std::cos(theta) * correction) / theta;
+}
+
+/// The axial force on e is N itself; a `couple` has none.
+double axial_force(ActuationModel model, double force_n) noexcept {
+  return model == ActuationModel::chamber ? force_n : std::numeric_limits<double>::quiet_NaN();
 }
 
 }  // namespace
@@ -49,26 +55,34 @@ Eigen::Vector2d solve_actuation(ActuationModel model, const Eigen::Vector2d& u_r
 
 void apply_actuation(const ArmParameters& arm, ConstVectorRef u, ConstVectorRef tau_actuation_nm,
                      VectorRef out) noexcept {
-  for (int i = 0; i < arm.size(); ++i) {
-    out.segment<2>(2 * i) =
-        actuation_matrix(arm.actuation, u.segment<2>(2 * i)) * tau_actuation_nm.segment<2>(2 * i);
+  const int width = arm.segment_dof();
+  for (int i = 0; i < arm.dof(); i += width) {
+    out.segment<2>(i) =
+        actuation_matrix(arm.actuation, u.segment<2>(i)) * tau_actuation_nm.segment<2>(i);
+    if (arm.extensible) out(i + 2) = axial_force(arm.actuation, tau_actuation_nm(i + 2));
   }
 }
 
 void solve_actuation(const ArmParameters& arm, ConstVectorRef u, ConstVectorRef force_nm,
                      VectorRef tau_actuation_nm, double min_determinant) noexcept {
+  const int width = arm.segment_dof();
   if (arm.actuation == ActuationModel::chamber) {  // the same matrix everywhere
-    for (Eigen::Index i = 0; i < force_nm.size(); i += 2) {
-      const double x = force_nm(i), y = force_nm(i + 1);
-      tau_actuation_nm(i) = -y;
-      tau_actuation_nm(i + 1) = x;
+    const Eigen::Index size = force_nm.size();
+    const double* const force = force_nm.data();
+    double* const tau = tau_actuation_nm.data();
+    for (Eigen::Index i = 0; i < size; i += width) {
+      const double x = force[i], y = force[i + 1];
+      tau[i] = -y;
+      tau[i + 1] = x;
+      if (width == 3) tau[i + 2] = force[i + 2];
     }
     return;
   }
-  for (int i = 0; i < arm.size(); ++i) {
-    const Eigen::Vector2d force = force_nm.segment<2>(2 * i);
-    tau_actuation_nm.segment<2>(2 * i) =
-        solve_actuation(arm.actuation, u.segment<2>(2 * i), force, min_determinant);
+  for (Eigen::Index i = 0; i < force_nm.size(); i += width) {
+    const Eigen::Vector2d force = force_nm.segment<2>(i);
+    tau_actuation_nm.segment<2>(i) =
+        solve_actuation(arm.actuation, u.segment<2>(i), force, min_determinant);
+    if (arm.extensible) tau_actuation_nm(i + 2) = std::numeric_limits<double>::quiet_NaN();
   }
 }
 

@@ -41,7 +41,7 @@ struct Composite {
   }
 };
 
-/// The second moments as plain numbers, applied to pairs of columns.
+/// The second moments as plain numbers, applied to a vector or to columns.
 struct SecondMoments {
   Vector3 x, y, z;  ///< rows
   double trace;
@@ -53,11 +53,13 @@ struct SecondMoments {
         trace(x.x + y.y + z.z) {}
 
   /// (trace - M) v
-  PairVector3 off_trace(const PairVector3& v) const noexcept {
-    return trace * v - PairVector3{dot(x, v), dot(y, v), dot(z, v)};
+  template <class T>
+  Vec3<T> off_trace(const Vec3<T>& v) const noexcept {
+    return trace * v - Vec3<T>{dot(x, v), dot(y, v), dot(z, v)};
   }
   /// (trace - M^T) v
-  PairVector3 off_trace_transposed(const PairVector3& v) const noexcept {
+  template <class T>
+  Vec3<T> off_trace_transposed(const Vec3<T>& v) const noexcept {
     return {trace * v.x - (x.x * v.x + y.x * v.y + z.x * v.z),
             trace * v.y - (x.y * v.x + y.y * v.y + z.y * v.z),
             trace * v.z - (x.z * v.x + y.z * v.y + z.z * v.z)};

@@ -3,34 +3,30 @@
 #include <cmath>
 #include <limits>
 #include <stdexcept>
-#include <string>
 
 #include "model/dynamics_storage.hpp"
 #include "softarm/model/kinematics.hpp"
 
 namespace softarm {
 
-DynamicsWorkspace::Storage::Storage(int segments)
-    : lanes(static_cast<std::size_t>((segments + kLanes - 1) / kLanes)),
-      forces(static_cast<std::size_t>(segments)),
-      columns(static_cast<std::size_t>(segments)),
-      zeros(Eigen::VectorXd::Zero(2 * segments)),
-      bias(2 * segments),
-      scale(2 * segments),
-      rhs(2 * segments),
-      solution(2 * segments),
-      residual(2 * segments),
-      B(2 * segments, 2 * segments),
-      factor(2 * segments, 2 * segments) {}
+DynamicsWorkspace::Storage::Storage(const ArmParameters& arm)
+    : inextensible(arm.extensible ? 0 : arm.segments.size()),
+      extensible(arm.extensible ? arm.segments.size() : 0),
+      zeros(Eigen::VectorXd::Zero(arm.dof())),
+      bias(arm.dof()),
+      scale(arm.dof()),
+      rhs(arm.dof()),
+      solution(arm.dof()),
+      residual(arm.dof()),
+      B(arm.dof(), arm.dof()),
+      factor(arm.dof(), arm.dof()) {}
 
-DynamicsWorkspace::DynamicsWorkspace(int segments) {
-  if (segments < 1) {
-    throw std::invalid_argument("DynamicsWorkspace: expected at least one segment, got " +
-                                std::to_string(segments));
+DynamicsWorkspace::DynamicsWorkspace(const ArmParameters& arm) {
+  if (arm.segments.empty()) {
+    throw std::invalid_argument("DynamicsWorkspace: expected at least one segment, got 0");
   }
-  storage_ = std::make_unique<Storage>(segments);
+  storage_ = std::make_unique<Storage>(arm);
 }
-DynamicsWorkspace::DynamicsWorkspace(const ArmParameters& arm) : DynamicsWorkspace(arm.size()) {}
 DynamicsWorkspace::~DynamicsWorkspace() = default;
 DynamicsWorkspace::DynamicsWorkspace(DynamicsWorkspace&&) noexcept = default;
 DynamicsWorkspace& DynamicsWorkspace::operator=(DynamicsWorkspace&&) noexcept = default;
@@ -68,6 +64,18 @@ void substitute(const Eigen::Ref<const Eigen::MatrixXd>& L,
 }
 
 }  // namespace
+
+void hold_constant_lengths(const ArmParameters& arm, Eigen::Ref<Eigen::MatrixXd> B,
+                           VectorRef force) noexcept {
+  for (int i = 0; i < arm.size(); ++i) {
+    if (!arm.segments[static_cast<std::size_t>(i)].constant_length) continue;
+    const int e = 3 * i + 2;
+    B.row(e).setZero();
+    B.col(e).setZero();
+    B(e, e) = 1.0;
+    force(e) = 0.0;
+  }
+}
 
 bool solve_inertia(DynamicsWorkspace& workspace, const Eigen::Ref<const Eigen::MatrixXd>& B,
                    ConstVectorRef rhs, VectorRef x) noexcept {
@@ -107,6 +115,7 @@ bool forward_dynamics(const ArmParameters& arm, DynamicsWorkspace& workspace, Co
                    {.inertia = false, .coriolis = true, .gravity = true}, s.bias);
   add_impedance(arm, u, velocity, s.bias);
   s.bias = generalized_force - s.bias;
+  if (arm.extensible) hold_constant_lengths(arm, s.B, s.bias);
   return solve_inertia(workspace, s.B, s.bias, acceleration);
 }
 
@@ -120,12 +129,16 @@ double kinetic_energy(const ArmParameters& arm, DynamicsWorkspace& workspace, Co
 
 void add_impedance(const ArmParameters& arm, ConstVectorRef u, ConstVectorRef velocity,
                    VectorRef generalized_force) noexcept {
-  for (int i = 0; i < arm.size(); ++i) {
-    const SegmentParameters& segment = arm.segments[static_cast<std::size_t>(i)];
-    for (int k = 2 * i; k < 2 * i + 2; ++k) {
+  Eigen::Index k = 0;
+  for (const SegmentParameters& segment : arm.segments) {
+    for (const Eigen::Index end = k + 2; k < end; ++k) {
       generalized_force(k) +=
           segment.stiffness_nm_per_rad * u(k) + segment.damping_nms_per_rad * velocity(k);
     }
+    if (!arm.extensible) continue;
+    generalized_force(k) +=
+        segment.axial_stiffness_n_per_m * u(k) + segment.axial_damping_ns_per_m * velocity(k);
+    ++k;
   }
 }
 

@@ -12,6 +12,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include "model/dynamics_storage.hpp"
 #include "softarm/model/dynamics.hpp"
@@ -20,9 +21,10 @@
 namespace softarm {
 namespace {
 
-/// Momenta of a column pair, handed from ancestor to ancestor.
+/// Momenta of a segment's columns, handed from ancestor to ancestor.
+template <class Column>
 struct ColumnMomenta {
-  PairVector3 P, L, P_rate, L_rate, flow;
+  Vec3<Column> P, L, P_rate, L_rate, flow;
 
   template <bool kCoriolis>
   void rotate_by(const Turn& turn) noexcept {
@@ -47,9 +49,13 @@ struct Output {
   Eigen::Index stride;
 
   double& operator()(int row, int col) const noexcept { return data[row + col * stride]; }
+  Output from(int row, int col) const noexcept { return {data + row + col * stride, stride}; }
 };
 
-/// Where the arm is and how it moves, in u or in polar coordinates.
+/// [u_x, u_y], [phi, theta] or [u_x, u_y, e] a segment.
+enum class Coordinates { u, polar, ue };
+
+/// Where the arm is and how it moves.
 struct State {
   const double* q;
   const double* velocity;
@@ -83,47 +89,52 @@ struct PolarColumns {
     J = {times_map(J.x), times_map(J.y), times_map(J.z)};
   }
   /// P' M P given the rows of M P.
-  void project_rows(Pair& first, Pair& second) const noexcept {
-    const Pair along_x = first, along_y = second;
-    first = x[0] * along_x + y[0] * along_y;
-    second = x[1] * along_x + y[1] * along_y;
+  void project_rows(OwnColumns<false>::Rows& rows) const noexcept {
+    rows = {x[0] * rows[0] + y[0] * rows[1], x[1] * rows[0] + y[1] * rows[1]};
   }
-  void apply(SegmentColumns& k) const noexcept {
+  void apply(SegmentColumns<false>& k) const noexcept {
     apply(k.translation, k.translation_rate);
     apply(k.rotation, k.rotation_rate);
-    OwnColumns& own = k.own;
+    OwnColumns<false>& own = k.own;
     apply(own.momentum, own.momentum_rate);
     apply(own.angular, own.angular_rate);
     apply(own.flow);
-    own.coriolis_x = times_map(own.coriolis_x) + times_rate(own.inertia_x);
-    own.coriolis_y = times_map(own.coriolis_y) + times_rate(own.inertia_y);
-    project_rows(own.coriolis_x, own.coriolis_y);
-    own.inertia_x = times_map(own.inertia_x);
-    own.inertia_y = times_map(own.inertia_y);
-    project_rows(own.inertia_x, own.inertia_y);
+    for (std::size_t e = 0; e < 2; ++e) {
+      own.coriolis[e] = times_map(own.coriolis[e]) + times_rate(own.inertia[e]);
+      own.inertia[e] = times_map(own.inertia[e]);
+    }
+    project_rows(own.coriolis);
+    project_rows(own.inertia);
   }
 };
 
 /// Four segments in u: what `outward` starts from.
+template <bool kExtensible>
 struct SegmentStates {
   ShapeLanes shape;
   DirectionOf<Lanes> velocity;
+  Lanes strain_rate, inverse_length;       ///< only where segments stretch
   std::array<PolarColumns, kLanes> polar;  ///< only where the coordinates are
 };
 
-template <bool kArc>
+template <bool kArc, bool kExtensible>
 void load_u(const ArmParameters& arm, int begin, const double* u, const double* rate,
-            SegmentStates& out) noexcept {
+            SegmentStates<kExtensible>& out) noexcept {
+  constexpr int kWidth = kCoordinates<kExtensible>;
   const int count = arm.size() - begin;
-  out.shape.ux = load(u, 2, count);
-  out.shape.uy = load(u + 1, 2, count);
-  set_shape<kArc>(arm, begin, out.shape);
-  out.velocity = load_direction(rate, count, out.shape);
+  out.shape.ux = load(u, kWidth, count);
+  out.shape.uy = load(u + 1, kWidth, count);
+  const Lanes length = set_shape<kArc, kExtensible>(arm, begin, u, out.shape);
+  out.velocity = load_direction<kExtensible>(rate, count, out.shape);
+  if constexpr (kExtensible) {
+    out.inverse_length = 1.0 / length;
+    out.strain_rate = load_strain_rate(rate, count, out.inverse_length);
+  }
 }
 
 template <bool kArc>
 void load_polar(const ArmParameters& arm, int begin, const double* q, const double* rate,
-                SegmentStates& out) noexcept {
+                SegmentStates<false>& out) noexcept {
   double u[2 * kLanes], u_rate[2 * kLanes];
   const int count = std::min(arm.size() - begin, kLanes);
   for (int l = 0; l < count; ++l) {
@@ -139,38 +150,48 @@ void load_polar(const ArmParameters& arm, int begin, const double* q, const doub
   load_u<kArc>(arm, begin, u, u_rate, out);
 }
 
-template <MassModel kMass, bool kPolar>
-void outward(const ArmParameters& arm, const State& state, SegmentColumns* out,
-             Vector3 gravity) noexcept {
+template <MassModel kMass, Coordinates kCoords>
+void outward(const ArmParameters& arm, const State& state,
+             SegmentColumns<kCoords == Coordinates::ue>* out, Vector3 gravity) noexcept {
   constexpr bool kArc = kMass == MassModel::distributed;
-  SegmentStates states;
+  constexpr bool kPolar = kCoords == Coordinates::polar, kExtensible = kCoords == Coordinates::ue;
+  constexpr int kWidth = kCoordinates<kExtensible>;
+  SegmentStates<kExtensible> states;
   const ShapeLanes& lanes = states.shape;
   Vector3 spin_of_frame{0, 0, 0};
   for (int i = 0; i < arm.size(); ++i) {
-    const int l = i % kLanes;
+    const int l = lane_of(i);
     if (l == 0) {
-      constexpr auto load_states = kPolar ? load_polar<kArc> : load_u<kArc>;
-      load_states(arm, i, state.q + 2 * i, state.velocity + 2 * i, states);
+      const double *q = state.q + kWidth * i, *rate = state.velocity + kWidth * i;
+      if constexpr (kPolar) {
+        load_polar<kArc>(arm, i, q, rate, states);
+      } else {
+        load_u<kArc>(arm, i, q, rate, states);
+      }
     }
     const double ux = lanes.ux[l], uy = lanes.uy[l];
     const Curve tip = lane(lanes.tip, l), centre = lane(lanes.centre, l);
     const Spin rotation = lane(lanes.turn_rate, l);
     const Direction v = lane(states.velocity, l);
-    SegmentColumns& k = out[i];
+    SegmentState<kExtensible> own{ux, uy, v, spin_of_frame, {}};
+    if constexpr (kExtensible) own.stretch = {states.strain_rate[l], states.inverse_length[l]};
+    SegmentColumns<kExtensible>& k = out[i];
     k.turn = turn(lanes, l);
     k.gravity = gravity;
-    k.tip = point(tip, ux, uy);
-    k.tip_rate = first(tip, ux, uy, v) + cross(spin_of_frame, k.tip);
-    k.translation = columns(tip, ux, uy);
-    k.rotation = columns(rotation, ux, uy);
-    k.translation_rate = column_rates(tip, ux, uy, v) + cross(spin_of_frame, k.translation);
-    k.rotation_rate = column_rates(rotation, ux, uy, v) + cross(spin_of_frame, k.rotation);
+    const auto end = point_motion(tip, own);
+    k.tip = end.place;
+    k.tip_rate = end.rate;
+    k.translation = end.J;
+    k.translation_rate = end.J_rate;
+    const PairVector3 spins = columns(rotation, ux, uy);
+    k.rotation = without_elongation<kExtensible>(spins);
+    k.rotation_rate = without_elongation<kExtensible>(column_rates(rotation, ux, uy, v) +
+                                                      cross(spin_of_frame, spins));
     k.mass = lanes.mass[l];
-    const OwnState own{ux, uy, k.mass, v, spin_of_frame};
     if constexpr (kArc) {
-      k.own = arc_columns(own, centre, lane(lanes.arc, l));
+      k.own = arc_columns(k.mass, own, centre, lane(lanes.arc, l));
     } else {
-      k.own = point_columns(own, centre);
+      k.own = point_columns(k.mass, own, centre);
     }
     if constexpr (kPolar) states.polar[static_cast<std::size_t>(l)].apply(k);
     spin_of_frame = rotate_back(k.turn, spin_of_frame + first(rotation, ux, uy, v));
@@ -178,12 +199,12 @@ void outward(const ArmParameters& arm, const State& state, SegmentColumns* out,
   }
 }
 
-/// Column pair j over everything beyond p_j, about p_j.
-template <bool kCoriolis>
-ColumnMomenta beyond(const SegmentColumns& k, const Composite& body) noexcept {
+/// Columns of j over everything beyond p_j, about p_j.
+template <bool kCoriolis, bool kExtensible>
+auto beyond(const SegmentColumns<kExtensible>& k, const Composite& body) noexcept {
   const Vector3 h = column(body.first, 0), h_rate = column(body.first, 1);
   const SecondMoments position(body.second, 0), mixed(body.second, 1);
-  ColumnMomenta m;
+  ColumnMomenta<Columns<kExtensible>> m;
   m.P = body.mass * k.translation - cross(h, k.rotation);
   m.L = cross(h, k.translation) + position.off_trace(k.rotation);
   if constexpr (!kCoriolis) return m;
@@ -194,52 +215,58 @@ ColumnMomenta beyond(const SegmentColumns& k, const Composite& body) noexcept {
   return m;
 }
 
-template <bool kCoriolis>
-void write_diagonal(int j, const SegmentColumns& k, const ColumnMomenta& m, const Output& B,
+template <bool kCoriolis, bool kExtensible>
+void write_diagonal(int j, const SegmentColumns<kExtensible>& k,
+                    const ColumnMomenta<Columns<kExtensible>>& m, const Output& B,
                     const Output& C) noexcept {
-  for (int a = 0; a < 2; ++a) {
+  constexpr int kWidth = kCoordinates<kExtensible>;
+  const Output B_jj = B.from(kWidth * j, kWidth * j), C_jj = C.from(kWidth * j, kWidth * j);
+  for (int a = 0; a < kWidth; ++a) {
+    const auto row = static_cast<std::size_t>(a);
     const Vector3 v = column(k.translation, a), w = column(k.rotation, a);
-    const Pair inertia = dot(v, m.P) + dot(w, m.L) + (a == 0 ? k.own.inertia_x : k.own.inertia_y);
-    for (int b = a; b < 2; ++b) {  // one triangle decides both: B is symmetric to the last bit
-      B(2 * j + a, 2 * j + b) = B(2 * j + b, 2 * j + a) = inertia[b];
+    const auto inertia = dot(v, m.P) + dot(w, m.L) + k.own.inertia[row];
+    for (int b = a; b < kWidth; ++b) {  // one triangle decides both: B is symmetric to the last bit
+      B_jj(a, b) = B_jj(b, a) = inertia[b];
     }
     if constexpr (!kCoriolis) continue;
-    const Pair coriolis =
-        dot(v, m.P_rate) + dot(w, m.L_rate) + (a == 0 ? k.own.coriolis_x : k.own.coriolis_y);
-    for (int b = 0; b < 2; ++b) C(2 * j + a, 2 * j + b) = coriolis[b];
+    const auto coriolis = dot(v, m.P_rate) + dot(w, m.L_rate) + k.own.coriolis[row];
+    for (int b = 0; b < kWidth; ++b) C_jj(a, b) = coriolis[b];
   }
 }
 
-template <bool kCoriolis>
-void write_pair(int i, int j, const SegmentColumns& k, const ColumnMomenta& m, const Output& B,
+template <bool kCoriolis, bool kExtensible>
+void write_pair(int i, int j, const SegmentColumns<kExtensible>& k,
+                const ColumnMomenta<Columns<kExtensible>>& m, const Output& B,
                 const Output& C) noexcept {
-  for (int a = 0; a < 2; ++a) {
+  constexpr int kWidth = kCoordinates<kExtensible>;
+  const Output B_ij = B.from(kWidth * i, kWidth * j), B_ji = B.from(kWidth * j, kWidth * i);
+  const Output C_ij = C.from(kWidth * i, kWidth * j), C_ji = C.from(kWidth * j, kWidth * i);
+  for (int a = 0; a < kWidth; ++a) {
     const Vector3 v = column(k.translation, a), w = column(k.rotation, a);
-    const Pair inertia = dot(v, m.P) + dot(w, m.L);
-    for (int b = 0; b < 2; ++b) {
-      B(2 * i + a, 2 * j + b) = B(2 * j + b, 2 * i + a) = inertia[b];
-    }
+    const auto inertia = dot(v, m.P) + dot(w, m.L);
+    for (int b = 0; b < kWidth; ++b) B_ij(a, b) = B_ji(b, a) = inertia[b];
     if constexpr (!kCoriolis) continue;
-    const Pair upper = dot(v, m.P_rate) + dot(w, m.L_rate);
-    const Pair lower = dot(column(k.translation_rate, a), m.P) +
+    const auto upper = dot(v, m.P_rate) + dot(w, m.L_rate);
+    const auto lower = dot(column(k.translation_rate, a), m.P) +
                        dot(column(k.rotation_rate, a), m.L) + dot(w, m.flow);
-    for (int b = 0; b < 2; ++b) {
-      C(2 * i + a, 2 * j + b) = upper[b];
-      C(2 * j + b, 2 * i + a) = lower[b];
+    for (int b = 0; b < kWidth; ++b) {
+      C_ij(a, b) = upper[b];
+      C_ji(b, a) = lower[b];
     }
   }
 }
 
-template <bool kCoriolis>
-void inward(int n, const SegmentColumns* segments, const Output& B, const Output& C,
+template <bool kCoriolis, bool kExtensible>
+void inward(int n, const SegmentColumns<kExtensible>* segments, const Output& B, const Output& C,
             double* G) noexcept {
+  constexpr int kWidth = kCoordinates<kExtensible>;
   Composite body;
   for (int j = n - 1; j >= 0; --j) {
-    const SegmentColumns& k = segments[j];
+    const SegmentColumns<kExtensible>& k = segments[j];
     body.rotate_by(k.turn);
-    ColumnMomenta m = beyond<kCoriolis>(k, body);
+    auto m = beyond<kCoriolis>(k, body);
     write_diagonal<kCoriolis>(j, k, m, B, C);
-    m.move_by<kCoriolis>(k.tip, k.tip_rate);
+    m.template move_by<kCoriolis>(k.tip, k.tip_rate);
     m.P += k.own.momentum;
     m.L += k.own.angular;
     if constexpr (kCoriolis) {
@@ -247,28 +274,28 @@ void inward(int n, const SegmentColumns* segments, const Output& B, const Output
       m.L_rate += k.own.angular_rate;
       m.flow += k.own.flow;
     }
-    const Pair weight = dot(k.gravity, m.P);
-    G[2 * j] = -weight[0];
-    G[2 * j + 1] = -weight[1];
+    const auto weight = dot(k.gravity, m.P);
+    for (int a = 0; a < kWidth; ++a) G[kWidth * j + a] = -weight[a];
     for (int i = j - 1; i >= 0; --i) {
-      const SegmentColumns& ancestor = segments[i];
-      m.rotate_by<kCoriolis>(ancestor.turn);
+      const SegmentColumns<kExtensible>& ancestor = segments[i];
+      m.template rotate_by<kCoriolis>(ancestor.turn);
       write_pair<kCoriolis>(i, j, ancestor, m, B, C);
-      m.move_by<kCoriolis>(ancestor.tip, ancestor.tip_rate);
+      m.template move_by<kCoriolis>(ancestor.tip, ancestor.tip_rate);
     }
     body.move_by(k.tip, side_by_side(k.tip, k.tip_rate));
     body.add(k.mass, k.own.first, k.own.second);
   }
 }
 
-template <bool kPolar>
-SegmentColumns* outward(const ArmParameters& arm, DynamicsWorkspace& workspace,
-                        const State& state) noexcept {
-  SegmentColumns* segments = workspace.storage().columns.data();
-  const auto run = arm.mass == MassModel::point ? outward<MassModel::point, kPolar>
-                                                : outward<MassModel::distributed, kPolar>;
+/// Both passes: B and G, and C where it is wanted. Without, C is not touched.
+template <Coordinates kCoords, bool kCoriolis>
+void evaluate(const ArmParameters& arm, DynamicsWorkspace& workspace, const State& state,
+              const Output& B, const Output& C, double* G) noexcept {
+  auto* segments = workspace.storage().of<kCoords == Coordinates::ue>().columns.data();
+  const auto run = arm.mass == MassModel::point ? outward<MassModel::point, kCoords>
+                                                : outward<MassModel::distributed, kCoords>;
   run(arm, state, segments, from_eigen(arm.base_rotation.transpose() * arm.gravity_mps2));
-  return segments;
+  inward<kCoriolis>(arm.size(), segments, B, C, G);
 }
 
 /// A thick arm's columns come from the recursion, which knows rotary inertia: B e_j and C(u, u')
@@ -293,14 +320,24 @@ void columns_of_recursion(const ArmParameters& arm, DynamicsWorkspace& workspace
   }
 }
 
+/// Segments that stretch have no polar form.
+void fill_with_nan(Eigen::Ref<Eigen::MatrixXd>& B, Eigen::Ref<Eigen::MatrixXd>& C,
+                   VectorRef& G) noexcept {
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  B.setConstant(kNan);
+  C.setConstant(kNan);
+  G.setConstant(kNan);
+}
+
 }  // namespace
 
 void dynamics_matrices(const ArmParameters& arm, DynamicsWorkspace& workspace, ConstVectorRef u,
                        ConstVectorRef velocity, Eigen::Ref<Eigen::MatrixXd> B,
                        Eigen::Ref<Eigen::MatrixXd> C, VectorRef G) noexcept {
-  const auto* segments = outward<false>(arm, workspace, {u.data(), velocity.data()});
-  inward<true>(arm.size(), segments, {B.data(), B.outerStride()}, {C.data(), C.outerStride()},
-               G.data());
+  const auto run =
+      arm.extensible ? evaluate<Coordinates::ue, true> : evaluate<Coordinates::u, true>;
+  run(arm, workspace, {u.data(), velocity.data()}, {B.data(), B.outerStride()},
+      {C.data(), C.outerStride()}, G.data());
   if (arm.is_thick()) columns_of_recursion(arm, workspace, u, velocity, B, &C);
 }
 
@@ -308,6 +345,7 @@ void polar_dynamics_matrices(const ArmParameters& arm, DynamicsWorkspace& worksp
                              ConstVectorRef q, ConstVectorRef velocity,
                              Eigen::Ref<Eigen::MatrixXd> B, Eigen::Ref<Eigen::MatrixXd> C,
                              VectorRef G) noexcept {
+  if (arm.extensible) return fill_with_nan(B, C, G);
   if (arm.is_thick()) {
     auto& s = workspace.storage();
     polar_to_u(q, s.residual);
@@ -315,17 +353,19 @@ void polar_dynamics_matrices(const ArmParameters& arm, DynamicsWorkspace& worksp
     dynamics_matrices(arm, workspace, s.residual, s.bias, B, C, G);
     return dynamics_to_polar(q, velocity, B, C, G);
   }
-  const auto* segments = outward<true>(arm, workspace, {q.data(), velocity.data()});
-  inward<true>(arm.size(), segments, {B.data(), B.outerStride()}, {C.data(), C.outerStride()},
-               G.data());
+  evaluate<Coordinates::polar, true>(arm, workspace, {q.data(), velocity.data()},
+                                     {B.data(), B.outerStride()}, {C.data(), C.outerStride()},
+                                     G.data());
 }
 
 void inertia_matrix(const ArmParameters& arm, DynamicsWorkspace& workspace, ConstVectorRef u,
                     Eigen::Ref<Eigen::MatrixXd> B) noexcept {
   auto& s = workspace.storage();
   if (arm.is_thick()) return columns_of_recursion(arm, workspace, u, s.zeros, B, nullptr);
-  const auto* segments = outward<false>(arm, workspace, {u.data(), s.zeros.data()});
-  inward<false>(arm.size(), segments, {B.data(), B.outerStride()}, {nullptr, 0}, s.residual.data());
+  const auto run =
+      arm.extensible ? evaluate<Coordinates::ue, false> : evaluate<Coordinates::u, false>;
+  const Output out{B.data(), B.outerStride()};
+  run(arm, workspace, {u.data(), s.zeros.data()}, out, out, s.residual.data());
 }
 
 }  // namespace softarm

@@ -16,26 +16,56 @@ struct SegmentForces {
   Vector3 moment;             ///< about the segment's base p_{i-1}
   double torque_x, torque_y;  ///< on the segment's own u
 };
+/// Where segments stretch.
+struct ExtensibleForces : SegmentForces {
+  double virial;  ///< sum of r . F, of which 1/l is the force on e
+};
 
 /// Full matrices: a segment's columns, all in S_{i-1}. A dot is a time derivative in the world,
 /// seen from S_{i-1}.
+template <bool kExtensible>
 struct SegmentColumns {
+  using Column = Columns<kExtensible>;
+
   Turn turn;
   double mass;
   Vector3 tip;       ///< p_i - p_{i-1}
   Vector3 tip_rate;  ///< its rate
   Vector3 gravity;
-  PairVector3 translation, translation_rate;  ///< v: motion of p_i for unit u_x', u_y'
-  PairVector3 rotation, rotation_rate;        ///< w: angular velocity of S_i for the same
-  OwnColumns own;
+  Vec3<Column> translation, translation_rate;  ///< v: motion of p_i for unit u_x', u_y', e'
+  Vec3<Column> rotation, rotation_rate;        ///< w: angular velocity of S_i for the same
+  OwnColumns<kExtensible> own;
+};
+
+template <bool kExtensible>
+using LanesOf = std::conditional_t<kExtensible, ExtensibleLanes, SegmentLanes>;
+template <bool kExtensible>
+using ForcesOf = std::conditional_t<kExtensible, ExtensibleForces, SegmentForces>;
+
+template <bool kExtensible>
+struct SegmentStorage {
+  std::vector<LanesOf<kExtensible>> lanes;  // four segments each
+  std::vector<ForcesOf<kExtensible>> forces;
+  std::vector<SegmentColumns<kExtensible>> columns;
+
+  explicit SegmentStorage(std::size_t segments)
+      : lanes((segments + kLanes - 1) / kLanes), forces(segments), columns(segments) {}
 };
 
 struct DynamicsWorkspace::Storage {
-  explicit Storage(int segments);
+  explicit Storage(const ArmParameters& arm);
 
-  std::vector<SegmentLanes> lanes;  // four segments each
-  std::vector<SegmentForces> forces;
-  std::vector<SegmentColumns> columns;
+  template <bool kExtensible>
+  SegmentStorage<kExtensible>& of() noexcept {
+    if constexpr (kExtensible) {
+      return extensible;
+    } else {
+      return inextensible;
+    }
+  }
+
+  SegmentStorage<false> inextensible;  ///< one of the two is empty
+  SegmentStorage<true> extensible;
   Eigen::VectorXd zeros, bias, scale, rhs, solution, residual;
   Eigen::MatrixXd B, factor;
 };

@@ -6,7 +6,7 @@ namespace {
 /// (u x e) for both columns e: the vector J u.
 Pair turned(double ux, double uy) noexcept { return Pair{-uy, ux}; }
 
-/// Terms of `arc_columns`, each for both columns e side by side. In the plane of S_{i-1}: J (x, y)
+/// Terms of `arc_columns` at constant length, each for both columns e side by side. In the plane of S_{i-1}: J (x, y)
 /// = (-y, x), u the bending, e the unit vectors, v = u'.
 struct ArcColumnTerms {
   const ArcMoments& m;
@@ -18,7 +18,8 @@ struct ArcColumnTerms {
   Pair kappa;     ///< u_e (u . v)
   Pair g_x, g_y;  ///< (u . v) e + u_e v + v_e u
 
-  ArcColumnTerms(const OwnState& state, const ArcMoments& moments) noexcept
+  template <bool kExtensible>
+  ArcColumnTerms(const SegmentState<kExtensible>& state, const ArcMoments& moments) noexcept
       : m(moments),
         ux(state.ux),
         uy(state.uy),
@@ -76,32 +77,91 @@ struct ArcColumnTerms {
   }
 };
 
-}  // namespace
-
-OwnColumns arc_columns(const OwnState& state, const Curve& centre, const ArcMoments& m) noexcept {
-  const ArcColumnTerms t(state, m);
-  const double ux = state.ux, uy = state.uy, mass = state.mass;
-  const Vector3 r = point(centre, ux, uy);
-  OwnColumns out;
-  const PairVector3 J = columns(centre, ux, uy);
-  out.momentum = mass * J;
-  out.momentum_rate = mass * (column_rates(centre, ux, uy, state.v) + cross(state.spin, J));
-  out.first = mass * side_by_side(r, first(centre, ux, uy, state.v) + cross(state.spin, r));
+[[gnu::always_inline]] inline OwnColumns<false> at_constant_length(double mass,
+                                                                   const ArcColumnTerms& t,
+                                                                   const Curve& centre) noexcept {
+  const ArcMoments& m = t.m;
+  const double ux = t.ux, uy = t.uy;
+  const auto c = point_motion(centre, SegmentState<false>{ux, uy, t.v, t.spin, {}});
+  OwnColumns<false> out;
+  out.momentum = mass * c.J;
+  out.momentum_rate = mass * c.J_rate;
+  out.first = mass * side_by_side(c.place, c.rate);
   out.angular = t.angular();
   out.angular_rate = t.angular_rate();
   out.flow = t.flow();
   const double stretch = 2.0 * m.pp1 + m.p1p1 * t.s + m.q1q1;
-  out.inertia_x = Pair{m.pp, 0.0} + (stretch * ux) * t.u;
-  out.inertia_y = Pair{0.0, m.pp} + (stretch * uy) * t.u;
+  out.inertia = {Pair{m.pp, 0.0} + (stretch * ux) * t.u, Pair{0.0, m.pp} + (stretch * uy) * t.u};
   // spin . int J_y x J_x, skew in the two columns
   const double skew = m.pq1 * t.spin_u - t.spin.z * (m.pp + m.pp1 * t.s);
-  out.coriolis_x = t.coriolis_row(ux, t.g_x) + Pair{0.0, skew};
-  out.coriolis_y = t.coriolis_row(uy, t.g_y) + Pair{-skew, 0.0};
+  out.coriolis = {t.coriolis_row(ux, t.g_x) + Pair{0.0, skew},
+                  t.coriolis_row(uy, t.g_y) + Pair{-skew, 0.0}};
   out.second = {
       t.second_row({m.pp * ux * ux, m.pp * ux * uy, m.pq * ux}, m.pp * ux, m.pp1 * ux, m.pq1 * ux),
       t.second_row({m.pp * ux * uy, m.pp * uy * uy, m.pq * uy}, m.pp * uy, m.pp1 * uy, m.pq1 * uy),
       t.second_row({m.pq * ux, m.pq * uy, m.qq}, m.pq, m.qp1, m.qq1)};
   return out;
 }
+
+/// {y, y'} where y grows at `strain_rate` as well.
+PairVector3 grown(const PairVector3& y, double strain_rate) noexcept {
+  return y + Pair{0.0, strain_rate} * column(y, 0);
+}
+
+/// All points are linear in l: the columns along u grow, and that along e is r / l.
+OwnColumns<true> with_elongation(const ArcColumnTerms& t, const OwnColumns<false>& held,
+                                 const Stretch<true>& stretch) noexcept {
+  const auto [grow, per_length] = stretch;
+  const ArcMoments& m = t.m;
+  // int r x r', int r . J_e, int r . J_e' and int J_e . r' at constant length
+  const Vector3 angular = t.v.x * column(held.angular, 0) + t.v.y * column(held.angular, 1) +
+                          SecondMoments(held.second, 0).off_trace(t.spin);
+  const Pair radial = m.trace_rate(t.s) * t.u;
+  const Pair turning = dot(t.spin, held.angular);
+  const Pair radial_rate =
+      (2.0 * m.pp1 + m.pp2 * t.s + m.qq2) * t.kappa + (m.pp1 * t.s + m.qq1) * t.dv - turning;
+  const Pair along_rate = t.v.x * held.inertia[0] + t.v.y * held.inertia[1] + turning;
+
+  OwnColumns<true> out;
+  out.momentum = beside(held.momentum, per_length * column(held.first, 0));
+  out.momentum_rate =
+      beside(held.momentum_rate + grow * held.momentum, per_length * column(held.first, 1));
+  out.angular = without_elongation<true>(held.angular);
+  out.angular_rate = beside(held.angular_rate + grow * held.angular, per_length * angular);
+  out.flow = beside(held.flow + grow * held.angular, -per_length * angular);
+  const auto rows = [&](std::size_t e, int lane) {
+    out.inertia[e] = beside(held.inertia[e], per_length * radial[lane]);
+    out.coriolis[e] =
+        beside(held.coriolis[e] + grow * held.inertia[e], per_length * along_rate[lane]);
+  };
+  rows(0, 0);
+  rows(1, 1);
+  const double per_area = per_length * per_length;
+  out.inertia[2] = beside(per_length * radial, per_area * (m.pp * t.s + m.qq));
+  out.coriolis[2] =
+      beside(per_length * (radial_rate + grow * radial), per_area * m.trace_rate(t.s) * t.v.along);
+  out.first = grown(held.first, grow);
+  out.second = {grown(held.second.x, grow), grown(held.second.y, grow), grown(held.second.z, grow)};
+  return out;
+}
+
+}  // namespace
+
+template <bool kExtensible>
+OwnColumns<kExtensible> arc_columns(double mass, const SegmentState<kExtensible>& state,
+                                    const Curve& centre, const ArcMoments& m) noexcept {
+  const ArcColumnTerms t(state, m);
+  const OwnColumns<false> held = at_constant_length(mass, t, centre);
+  if constexpr (kExtensible) {
+    return with_elongation(t, held, state.stretch);
+  } else {
+    return held;
+  }
+}
+
+template OwnColumns<false> arc_columns(double, const SegmentState<false>&, const Curve&,
+                                       const ArcMoments&) noexcept;
+template OwnColumns<true> arc_columns(double, const SegmentState<true>&, const Curve&,
+                                      const ArcMoments&) noexcept;
 
 }  // namespace softarm

@@ -48,7 +48,8 @@ inline DirectionOf<T> direction(T ux, T uy, T x, T y) noexcept {
   return {x, y, ux * x + uy * y};
 }
 
-inline Vector3 point(const Curve& f, double ux, double uy) noexcept {
+template <class T>
+inline Vec3<T> point(const CurveOf<T>& f, T ux, T uy) noexcept {
   return {f.p * ux, f.p * uy, f.q};
 }
 

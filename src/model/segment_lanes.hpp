@@ -1,8 +1,9 @@
 // Four neighbouring segments side by side, one lane a segment: what does not depend on how their
-// frames move waits for nobody and is done for all four at once.
+// frames move is computed for all four at once.
 #pragma once
 
 #include "model/arc_moments.hpp"
+#include "model/point_motion.hpp"
 #include "softarm/model/arm.hpp"
 
 namespace softarm {
@@ -16,21 +17,28 @@ struct ShapeLanes {
   ArcMomentsOf<Lanes> arc;  ///< only where mass is distributed
 };
 
+/// Segment i is this lane of this group of four. Unsigned: half the instructions.
+inline int lane_of(int i) noexcept { return static_cast<int>(static_cast<unsigned>(i) % kLanes); }
+inline unsigned group_of(int i) noexcept { return static_cast<unsigned>(i) / kLanes; }
+
 /// v[0], v[stride], ... for `count` lanes, 0 beyond.
 inline Lanes load(const double* v, int stride, int count) noexcept {
   return Lanes{v[0], count > 1 ? v[stride] : 0.0, count > 2 ? v[2 * stride] : 0.0,
                count > 3 ? v[3 * stride] : 0.0};
 }
 
-/// Fills everything but ux and uy, which the caller has set, for the segments from `begin` on.
-/// Lanes beyond the last segment are straight and weigh nothing.
-template <bool kArc>
-inline void set_shape(const ArmParameters& arm, int begin, ShapeLanes& k) noexcept {
+/// Fills everything but ux and uy, which the caller has set, for the segments from `begin` on,
+/// whose coordinates are at q, and returns their lengths. Lanes beyond the last segment are straight
+/// and weigh nothing.
+template <bool kArc, bool kExtensible>
+inline Lanes set_shape(const ArmParameters& arm, int begin, const double* q,
+                       ShapeLanes& k) noexcept {
   static_assert(sizeof(SegmentParameters) % sizeof(double) == 0);
   constexpr int kStride = sizeof(SegmentParameters) / sizeof(double);
   const int count = arm.size() - begin;
   const SegmentParameters& segment = arm.segments[static_cast<std::size_t>(begin)];
-  const Lanes length = load(&segment.length_m, kStride, count);
+  Lanes length = load(&segment.length_m, kStride, count);
+  if constexpr (kExtensible) length += load(q + 2, 3, count);
   const Lanes s = k.ux * k.ux + k.uy * k.uy;
   const auto c = entire < kArc ? 12 : 8 > (s);
   k.mass = load(&segment.mass_kg, kStride, count);
@@ -39,10 +47,18 @@ inline void set_shape(const ArmParameters& arm, int begin, ShapeLanes& k) noexce
   k.centre = centre_curve(length, c);
   k.turn_rate = spin(c);
   if constexpr (kArc) k.arc = arc_moments(k.mass * length * length, s, c);
+  return length;
 }
 
+/// Rates at v: those of u.
+template <bool kExtensible>
 inline DirectionOf<Lanes> load_direction(const double* v, int count, const ShapeLanes& k) noexcept {
-  return direction(k.ux, k.uy, load(v, 2, count), load(v + 1, 2, count));
+  constexpr int kWidth = kCoordinates<kExtensible>;
+  return direction(k.ux, k.uy, load(v, kWidth, count), load(v + 1, kWidth, count));
+}
+/// Rates at v: that of e over the length.
+inline Lanes load_strain_rate(const double* v, int count, const Lanes& inverse_length) noexcept {
+  return load(v + 2, 3, count) * inverse_length;
 }
 
 inline Turn turn(const ShapeLanes& k, int l) noexcept {
@@ -65,12 +81,21 @@ inline ArcMoments lane(const ArcMomentsOf<Lanes>& m, int l) noexcept {
 
 /// What inverse_dynamics adds: motion within S_{i-1}, twice along a and b and once along x.
 struct SegmentLanes : ShapeLanes {
+  static constexpr bool kExtensible = false;
+
   DirectionOf<Lanes> a, b;
   Vec3<Lanes> spin_a, spin_b;  ///< angular velocity of S_i relative to S_{i-1} along a, b
   Vec3<Lanes> own_tip, own_centre, own_spin;  ///< accelerations, the last one angular
   /// Distributed mass: integrals of P, Q and (P1 u, Q1) times the acceleration.
   Vec3<Lanes> own_p, own_q;
   Lanes own_stretch;
+};
+
+/// Where segments stretch: 1 / l, and e' / l along a and b.
+struct ExtensibleLanes : SegmentLanes {
+  static constexpr bool kExtensible = true;
+
+  Lanes inverse_length, strain_a, strain_b;
 };
 
 }  // namespace softarm

@@ -48,11 +48,15 @@ inline auto cross(const Vec3<S>& a, const Vec3<T>& b) noexcept {
   using R = decltype(a.x * b.x);
   return Vec3<R>{a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
-inline Vector3 column(const PairVector3& v, int k) noexcept { return {v.x[k], v.y[k], v.z[k]}; }
+/// One number of each component.
+template <class T>
+inline Vector3 column(const Vec3<T>& v, int k) noexcept {
+  return {v.x[k], v.y[k], v.z[k]};
+}
 inline PairVector3 side_by_side(const Vector3& a, const Vector3& b) noexcept {
   return {Pair{a.x, b.x}, Pair{a.y, b.y}, Pair{a.z, b.z}};
 }
-inline Vector3 lane(const Vec3<Lanes>& v, int k) noexcept { return {v.x[k], v.y[k], v.z[k]}; }
+inline Vector3 lane(const Vec3<Lanes>& v, int k) noexcept { return column(v, k); }
 
 inline Vector3 from_eigen(const Eigen::Vector3d& v) noexcept { return {v.x(), v.y(), v.z()}; }
 inline Eigen::Vector3d to_eigen(const Vector3& v) noexcept { return {v.x, v.y, v.z}; }

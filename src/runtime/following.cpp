@@ -135,4 +135,42 @@ double OscillationWatch::HighPass::pass(double value, double share) noexcept {
   return fast - slower_;
 }
 
+LengthWatch::LengthWatch(const SafetySettings& settings, const ArmParameters& arm)
+    : settling_ns_(to_ns(settings.length_settling_s)),
+      warning_{.relative = settings.length_warning},
+      fault_{.relative = settings.length_fault} {
+  for (const SegmentParameters& segment : arm.segments) length_m_.push_back(segment.length_m);
+  reset();
+}
+
+void LengthWatch::reset() noexcept {
+  for (Limit* limit : {&warning_, &fault_}) {
+    limit->since_ns.fill(kNever);
+    limit->exceeded = limit->beyond = false;
+  }
+}
+
+void LengthWatch::judge(std::int64_t capture_ns, const CurvatureEstimate& estimate) noexcept {
+  judge(capture_ns, estimate, warning_);
+  judge(capture_ns, estimate, fault_);
+}
+
+void LengthWatch::judge(std::int64_t capture_ns, const CurvatureEstimate& estimate,
+                        Limit& limit) noexcept {
+  if (limit.relative <= 0.0) return;
+  limit.exceeded = limit.beyond = false;
+  for (std::size_t i = 0; i < length_m_.size(); ++i) {
+    const double allowed_m = limit.relative * length_m_[i];
+    const bool evident =
+        estimate.valid[i] && 3.0 * std::sqrt(estimate.length_variance_m2[i]) <= allowed_m;
+    std::int64_t& since_ns = limit.since_ns[i];
+    if (evident) {
+      const bool off = std::abs(estimate.length_m[i] - length_m_[i]) > allowed_m;
+      since_ns = !off ? kNever : since_ns == kNever ? capture_ns : since_ns;
+    }
+    limit.beyond |= since_ns != kNever;
+    limit.exceeded |= since_ns != kNever && capture_ns - since_ns >= settling_ns_;
+  }
+}
+
 }  // namespace softarm

@@ -69,7 +69,7 @@ bool EventLogReader::meets_sync(std::size_t size) {
 }
 
 /// Size of the event at the cursor, or 0 if there is no acceptable one.
-std::size_t EventLogReader::believable_size() {
+std::size_t EventLogReader::plausible_size() {
   if (available(kHeader) < kHeader || !sync_at(0)) return 0;
   const std::byte* header = buffer_.data() + at_;
   const std::uint64_t channel = number_at(header + 20, 4);
@@ -117,7 +117,7 @@ bool EventLogReader::next(LogEvent& event) {
   at_ += std::exchange(event_, 0);
   const std::int64_t begin = position();
   std::size_t size = 0;
-  while (available(1) > 0 && (size = believable_size()) == 0) skip_to_sync();
+  while (available(1) > 0 && (size = plausible_size()) == 0) skip_to_sync();
   if (position() > begin) add_damage(begin, position());
   if (size == 0) return false;
   const std::byte* header = buffer_.data() + at_;
@@ -129,11 +129,6 @@ bool EventLogReader::next(LogEvent& event) {
   event.data = {header + kHeader + channel, size - kHeader - channel};
   event_ = size;
   return true;
-}
-
-EventLogWriter::EventLogWriter(const std::filesystem::path& file)
-    : path_(file), file_(file, std::ios::binary | std::ios::trunc) {
-  if (!file_) throw std::runtime_error(path_.string() + ": expected a file that can be written");
 }
 
 void EventLogWriter::write(std::int64_t time_us, std::string_view channel,
@@ -151,23 +146,10 @@ void EventLogWriter::write(std::int64_t time_us, std::string_view channel,
   put_number(static_cast<std::uint64_t>(time_us), 8, to);
   put_number(channel.size(), 4, to);
   put_number(data.size(), 4, to);
-  const auto put = [this](const void* bytes, std::size_t size) {
-    file_.write(static_cast<const char*>(bytes), static_cast<std::streamsize>(size));
-  };
-  put(header.data(), header.size());
-  put(channel.data(), channel.size());
-  put(data.data(), data.size());
-  check();
-}
-
-void EventLogWriter::close() {
-  file_.close();
-  check();
-}
-
-void EventLogWriter::check() {
-  if (!file_)
-    throw std::runtime_error(path_.string() + ": could not be written; is the disk full?");
+  event_.assign(reinterpret_cast<const char*>(header.data()), header.size());
+  event_ += channel;
+  event_.append(reinterpret_cast<const char*>(data.data()), data.size());
+  file_.write(event_);
 }
 
 }  // namespace softarm

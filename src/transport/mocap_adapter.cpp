@@ -17,10 +17,11 @@ MocapAdapter::MocapAdapter(const BodySettings& bodies, const ArmParameters& arm,
       convention_(bodies.segment_ids.size() + 1) {
   const double unit_m = mocap.unit == LengthUnit::millimetre ? 1e-3 : 1.0;
   for (std::size_t i = 0; i < convention_.size(); ++i) {
-    MarkerFrameSettings plate;
-    if (i == 0 && !base_is_fixed()) plate = bodies.base_plate;
-    if (i > 0 && i <= bodies.segment_plates.size()) plate = bodies.segment_plates[i - 1];
-    convention_[i] = {unit_m, mocap.axes, pose_on_body(plate)};
+    MarkerFrameSettings frame;
+    if (i == 0 && !base_is_fixed()) frame = bodies.base_marker_frame;
+    if (i > 0 && i <= bodies.segment_marker_frames.size())
+      frame = bodies.segment_marker_frames[i - 1];
+    convention_[i] = {unit_m, mocap.axes, pose_on_body(frame)};
   }
 }
 

@@ -17,9 +17,9 @@ std::vector<std::string> mocap_channels(const TransportSettings& transport) {
   if (!transport.mocap.source.channel_per_body) return {transport.lcm.mocap_channel};
   std::vector<std::string> channels;
   if (transport.bodies.base_id >= 0)
-    channels.push_back(body_channel(transport.lcm, transport.bodies.base_plate));
-  for (const MarkerFrameSettings& plate : transport.bodies.segment_plates)
-    channels.push_back(body_channel(transport.lcm, plate));
+    channels.push_back(body_channel(transport.lcm, transport.bodies.base_marker_frame));
+  for (const MarkerFrameSettings& frame : transport.bodies.segment_marker_frames)
+    channels.push_back(body_channel(transport.lcm, frame));
   return channels;
 }
 

@@ -1,4 +1,4 @@
-// What decoded messages may say: any numbers, offered to a pipeline that is ACTIVE. Whatever they
+// Decoded messages with any numbers, offered to a pipeline that is ACTIVE. Whatever they
 // are, pressures stay finite, within their limits, and change no faster than they may.
 #include <cstring>
 #include <memory>

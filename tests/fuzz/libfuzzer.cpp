@@ -59,7 +59,7 @@ extern "C" int LLVMFuzzerInitialize(int* argc, char*** argv) {
   return 0;
 }
 
-/// A broken property ends the program as an exception that nobody catches, which libFuzzer reports.
+/// A broken property ends the program as an uncaught exception, which libFuzzer reports.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   chosen->run(std::as_bytes(std::span(data, size)));
   return 0;

@@ -1,5 +1,5 @@
-// Event logs: every byte is in one event or in one stretch of damage, events are what stands there,
-// and damage costs nothing of what precedes it.
+// Event logs: every byte is in one event or in one damaged range, events are read as written, and
+// damage costs nothing of what precedes it.
 #include <sstream>
 
 #include "fuzz/target.hpp"
@@ -40,7 +40,7 @@ Reading read_checked(const std::string& text) {
   require(log.position() == static_cast<std::int64_t>(text.size()), "the log is read to its end");
   require(reading.bytes + log.damaged_bytes() == log.position(),
           "every byte is of an event or damaged");
-  require(log.damage_text().empty() == (log.damaged_bytes() == 0), "damage is told");
+  require(log.damage_text().empty() == (log.damaged_bytes() == 0), "damage is reported");
   return reading;
 }
 

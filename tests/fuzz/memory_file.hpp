@@ -14,7 +14,7 @@ namespace softarm::test {
 class MemoryFile {
  public:
   MemoryFile() : file_(memfd_create("softarm_fuzz", MFD_CLOEXEC)) {
-    if (file_ < 0) throw std::runtime_error("no file in memory is to be had");
+    if (file_ < 0) throw std::runtime_error("no file in memory");
   }
   ~MemoryFile() { close(file_); }
   MemoryFile(const MemoryFile&) = delete;

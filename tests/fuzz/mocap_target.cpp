@@ -15,8 +15,9 @@ struct Source {
   explicit Source(const MocapSourceKind& kind) : format(kind.make()) {
     TransportSettings transport;
     transport.mocap.source = kind;
-    transport.bodies = {
-        .base_id = -1, .segment_ids = {1, 2}, .segment_plates = {{.name = "a"}, {.name = "b"}}};
+    transport.bodies = {.base_id = -1,
+                        .segment_ids = {1, 2},
+                        .segment_marker_frames = {{.name = "a"}, {.name = "b"}}};
     ArmParameters arm;
     arm.segments.resize(2);
     source = std::make_unique<MocapSource>(transport, SafetySettings{}, arm);
@@ -61,7 +62,7 @@ void run_mocap(std::span<const std::byte> input) {
   require(receipt != MocapReceipt::frame || (frame.segments == 2 && frame.capture_ns <= now_ns),
           "a frame is the arm's, and not of the future");
   if (!accepted) return;
-  require(it.sent.bodies <= SentFrame::kMostBodies, "bodies stay within the room for them");
+  require(it.sent.bodies <= SentFrame::kMostBodies, "bodies stay within their capacity");
   require(it.format->decode(it.format->encode(it.sent), it.again), "what was accepted can be sent");
   require(std::equal(it.sent.body.begin(), it.sent.body.begin() + it.sent.bodies,
                      it.again.body.begin(), it.again.body.begin() + it.again.bodies, same),

@@ -1,4 +1,4 @@
-// OptiTrack's frames, which a walk of our own takes apart: what it accepts LCM's decoder takes to
+// OptiTrack's frames, read by our own walk over the bytes: what it accepts LCM's decoder takes to
 // the last byte, and both read the same.
 #include <algorithm>
 #include <cmath>

@@ -20,7 +20,7 @@ const Experiment& experiment() {
 
 void put_digest(Bytes& record) {
   if (record.size() < kDigest) return;
-  std::uint64_t digest = 14695981039346656037ull;  // FNV-1a, as lcmtypes/tick_record_t.lcm says
+  std::uint64_t digest = 14695981039346656037ull;  // FNV-1a, as in lcmtypes/tick_record_t.lcm
   for (std::size_t k = 0; k < record.size() - kDigest; ++k)
     digest = (digest ^ std::to_integer<std::uint64_t>(record[k])) * 1099511628211ull;
   for (std::size_t k = 0; k < kDigest; ++k)

@@ -35,7 +35,7 @@ void run_yaml(std::span<const std::byte> input) {
   try {
     experiment = load_experiment(file.path());
   } catch (const ConfigError& error) {
-    require(!error.expected.empty() && !error.got.empty(), "an error tells what was expected");
+    require(!error.expected.empty() && !error.got.empty(), "an error states what was expected");
     return;
   }
   expect_the_same_again(file, experiment);

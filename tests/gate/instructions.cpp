@@ -18,7 +18,7 @@ std::string label(const Method& method, int segments) {
 }
 
 void count(const Method& method, int segments) {
-  const BenchInputs inputs = bench_inputs(segments);
+  const BenchInputs inputs = bench_inputs(segments, method.extensible);
   const auto evaluator =
       make_evaluator(method, inputs.arm, bench_controller(method, inputs.arm.size()));
   evaluator->evaluate(inputs.states.front());  // binds what the linker left for the first call
@@ -40,6 +40,9 @@ int main() {
         softarm::count(Method{Route::controller, polar, mass}, segments);
       }
       softarm::count(Method{Route::recursion, false, mass}, segments);
+      for (const Route route : {Route::matrices, Route::recursion}) {
+        softarm::count(Method{route, false, mass, true}, segments);
+      }
     }
     softarm::count(Method{Route::recursion, false, mass}, 100);
     softarm::count(Method{Route::controller, false, mass}, 100);

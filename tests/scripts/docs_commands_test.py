@@ -74,7 +74,7 @@ SLOW = {
 # What a busy machine may make of them: a check of the timing fails.
 MAY_END_WITH_1 = {
     "softarm check --live config/paper_arm.yaml --seconds 2",
-    "softarm check --live config/one_segment.yaml --seconds 2 --pulse --hold 0.45",  # fails as the page says
+    "softarm check --live config/one_segment.yaml --seconds 2 --pulse --hold 0.45",  # fails as documented
 }
 NEEDS_PYTHON = "build/python/"  # made by tools/python_environment, which fetches a package
 

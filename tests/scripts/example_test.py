@@ -1,4 +1,4 @@
-"""Runs a program of examples/ as its first comment says; it must end with 0 and print what it should.
+"""Runs a program of examples/ as its first comment states; it must end with 0 and print what it should.
 
 usage: example_test.py [--arm EXPERIMENT] --prints REGEX FOLDER_OF_THE_PROGRAMS EXAMPLE [ARGUMENTS...]
 With --arm it runs beside softarm-plant and softarmd on config/EXPERIMENT, and gets its file as first argument. "@" in an

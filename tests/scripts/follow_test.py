@@ -10,7 +10,7 @@ import tempfile
 import time
 import unittest
 
-from running_arm import PYTHON, ROOT, go_on_in_our_python, own_url, skip_without_multicast, start, write_config
+from running_arm import PATIENCE_S, PYTHON, ROOT, go_on_in_our_python, own_url, skip_without_multicast, start, write_config
 
 EXAMPLE = ROOT / "examples/follow.py"
 
@@ -42,7 +42,7 @@ class Follow(unittest.TestCase):
         start(self, folder, PROGRAMS / "softarmd", config)
         example = start(self, folder, PYTHON, "-B", EXAMPLE, "--url", url, "--duration", "6", "--rate", "2",
                         "--bend", str(BEND_RAD))
-        end = time.monotonic() + 60
+        end = time.monotonic() + PATIENCE_S
         while example.poll() is None and time.monotonic() < end:
             node.handle_timeout(100)
         self.assertEqual(example.poll(), 0, (folder / "python.txt").read_text(encoding="utf-8"))

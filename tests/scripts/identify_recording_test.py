@@ -19,7 +19,7 @@ TOOLS = pathlib.Path(__file__).resolve().parents[2] / "tools"
 PROGRAM = sys.argv.pop(1)
 PSI_BAR = 0.0689476
 LENGTH_M, BETA_OVER_K_S, LAG_S = 0.33, 0.8, 0.7
-# What a bar of each column turns the tip by, about the room's x and z, rad: neither square nor equal.
+# What a bar of each column turns the tip by, about the x and z axes of the laboratory, rad: neither square nor equal.
 TURN = np.array([[0.10, 0.20], [-0.22, 0.08], [-0.09, -0.25], [0.17, -0.11]])
 NOISE_RAD = 2e-4
 

@@ -14,7 +14,7 @@ PATIENCE_S = 300
 PAGE = ROOT / "docs/tutorial/laboratory.md"
 
 if subprocess.run([ROOT / "tools/with_loopback_network", "true"], capture_output=True, check=False).returncode != 0:
-    print("skipped: no network of our own can be made here, and there is no multicast route")
+    print("skipped: no separate network can be made here, and there is no multicast route")
     sys.exit(77)
 
 

@@ -1,4 +1,4 @@
-"""The daemon follows frames that a client nobody here wrote publishes: the Python package lcm. Argument: folder of the programs.
+"""The daemon follows frames that an independent client publishes: the Python package lcm. Argument: folder of the programs.
 
 Runs in the Python of tools/python_environment; skipped where that was not made.
 """
@@ -9,7 +9,7 @@ import sys
 import tempfile
 import unittest
 
-from running_arm import PYTHON, ROOT, go_on_in_our_python, own_url, skip_without_multicast, start, tracks_within, write_config
+from running_arm import PYTHON, ROOT, go_on_in_our_python, main_at_once, own_url, skip_without_multicast, start, tracks_within, write_config
 
 EXAMPLE = ROOT / "examples/republish.py"
 
@@ -20,7 +20,7 @@ import lcm  # noqa: E402
 from softarm_messages import controller_status_t, optitrack_frame_t  # noqa: E402
 
 PROGRAMS = pathlib.Path(sys.argv.pop(1))
-# It is 1.4 mrad with the frames of config/paper_arm.yaml; 4 mm between plate and axis unknown to the daemon are more than this.
+# It is 1.4 mrad with the frames of config/paper_arm.yaml; 4 mm between marker frame and axis unknown to the daemon are more than this.
 BOUND_RAD = 0.01
 
 
@@ -85,4 +85,4 @@ class Mocap(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    unittest.main()
+    main_at_once()

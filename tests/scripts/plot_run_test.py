@@ -94,8 +94,8 @@ class PlotRun(unittest.TestCase):
         rows = [[0.02 * k] + [0.1, 0.01 * k] * 6 + [0.001 * k, 0.0, 0.0] * 7 for k in range(200)]
         text = "# origin\n" + ",".join(names) + "\n" + "\n".join(",".join(map(str, row)) for row in rows)
         (self.directory / "shape.csv").write_text(text + "\n0.5,0.1", encoding="utf-8")  # cut off within a row
-        told = {"tracking": {"tip_rms_m": 0.001, "tip_max_m": 0.002, "tip_near_after_s": 1.5}}
-        (self.directory / "summary.json").write_text(json.dumps(told), encoding="utf-8")
+        summary = {"tracking": {"tip_rms_m": 0.001, "tip_max_m": 0.002, "tip_near_after_s": 1.5}}
+        (self.directory / "summary.json").write_text(json.dumps(summary), encoding="utf-8")
         shape = ShapeLog.of(RunLog(self.directory))
         self.assertEqual((shape.parts, shape.points.shape), (6, (200, 7, 3)))
         self.assertAlmostEqual(shape.bends[100, 5, 1], 1.0)

@@ -1,6 +1,6 @@
 """softarm check --live and softarm jog against running arms, each wrong by one thing. Argument: folder of the programs.
 
-All arms run at once, and each check on a port of its own: together they take as long as the longest.
+All arms run at once, and each check on a separate port: together they take as long as the longest, and keys are held meanwhile.
 """
 import json
 import os
@@ -16,10 +16,9 @@ import threading
 import time
 import unittest
 
-from running_arm import ROOT, skip_without_multicast
+from running_arm import PATIENCE_S, own_url, skip_without_multicast, start, wait_for, write_config
 
 PROGRAMS = pathlib.Path(sys.argv.pop(1))
-PATIENCE_S = 60
 
 skip_without_multicast()
 
@@ -31,42 +30,31 @@ SOON = ["--seconds", "2", "--pulse", "--hold", "0.45"]
 
 
 class Arm:
-    """A simulated arm with a port of LCM and a folder of its own."""
-    count = 0
+    """A simulated arm with its own LCM port and folder."""
 
     def __init__(self, test, base="paper_arm.yaml", more=ARM):
-        Arm.count += 1
         self.test, self.base, self.more = test, base, more
-        self.url = f"udpm://239.255.76.67:{20000 + (32 * os.getpid() + Arm.count) % 12000}?ttl=0"
+        self.url = own_url()
         temporary = tempfile.TemporaryDirectory()
         test.addClassCleanup(temporary.cleanup)
         self.folder = pathlib.Path(temporary.name)
 
     def config(self, name, more=None, daemon=""):
         """An experiment on this arm's port; `more` stands in place of the arm's own keys."""
-        path = self.folder / f"{name}.yaml"
-        path.write_text(f"include: {ROOT}/config/{self.base}\nname: {name}\n{self.more if more is None else more}"
-                        f"daemon:\n  lcm: {{url: \"{self.url}\", command_validity_s: 0.3}}\n  safety: {{{SAFETY}}}\n{daemon}", encoding="utf-8")
-        return path
+        return write_config(self.folder, self.base, self.url, self.more if more is None else more, name,
+                            SAFETY, daemon)
 
     def start(self, said, program, *arguments):
-        """A program that gets SIGTERM in the end; returns once it has said `said`."""
+        """Returns once the program has said `said`."""
+        process = start(self.test, self.folder, PROGRAMS / program, *arguments)
         output = self.folder / f"{program}.txt"
-        with open(output, "w", encoding="utf-8") as file:
-            process = subprocess.Popen([PROGRAMS / program, *arguments], stdout=file, stderr=file)
-
-        def end():
-            process.kill()
-            process.wait()
-
-        self.test.addClassCleanup(end)
         wait_for(lambda: said in output.read_text(encoding="utf-8"), f"{program}: {said}")
         return process
 
     def plant(self, *arguments, daemon=""):
         return self.start("motion capture at", "softarm-plant", *arguments, self.config("plant", daemon=daemon))
 
-    def spoilt_plant(self, fault, *arguments):
+    def faulty_plant(self, fault, *arguments):
         """With softarm-dev fault between its sensors and us."""
         self.plant("--sensor-suffix", "_CLEAN")
         self.start("", "softarm-dev", "fault", self.config("relay"), fault, "--after", "0", "--for", "100", *arguments)
@@ -76,14 +64,6 @@ class Arm:
         done = subprocess.run([PROGRAMS / "softarm", "check", config, "--live", *arguments], capture_output=True,
                               text=True, timeout=PATIENCE_S, check=False)
         return done.returncode, done.stdout, done.stderr
-
-
-def wait_for(reached, what):
-    end = time.monotonic() + PATIENCE_S
-    while not reached():
-        if time.monotonic() > end:
-            raise TimeoutError(what)
-        time.sleep(0.01)
 
 
 SCENES = {}
@@ -109,8 +89,8 @@ def swapped_chambers(test):
 
 
 @scene
-def beliefs(test):
-    """One arm, looked at with beliefs that are wrong by one thing each."""
+def wrong_settings(test):
+    """One arm, checked against configurations with one wrong setting each."""
     arm = Arm(test, more="arm: {segments: 3}\n" + CAMERA)
     arm.plant()
     wrong = {
@@ -175,14 +155,14 @@ def vicon(test):
 @scene
 def mirror(test):
     arm = Arm(test)
-    arm.spoilt_plant("mirror")
+    arm.faulty_plant("mirror")
     return arm.check(arm.config("lab"), *SOON)
 
 
 @scene
 def leak(test):
     arm = Arm(test)
-    arm.spoilt_plant("leak", "--body", "5")
+    arm.faulty_plant("leak", "--body", "5")
     return arm.check(arm.config("lab"), *SOON)
 
 
@@ -202,39 +182,43 @@ def tubes(test):
 
 class Preflight(unittest.TestCase):
     @classmethod
-    def setUpClass(cls):
-        cls.told = {}
+    def play(cls):
+        """Every scene in a thread, from now on."""
+        cls.outcomes = {}
 
         def play(name, body):
             try:
-                cls.told[name] = body(cls)
+                cls.outcomes[name] = body(cls)
             except Exception as error:  # pylint: disable=broad-except
-                cls.told[name] = error
+                cls.outcomes[name] = error
 
-        threads = [threading.Thread(target=play, args=each) for each in SCENES.items()]
-        for thread in threads:
+        cls.threads = [threading.Thread(target=play, args=each) for each in SCENES.items()]
+        for thread in cls.threads:
             thread.start()
-        for thread in threads:
+
+    @classmethod
+    def setUpClass(cls):
+        for thread in cls.threads:
             thread.join()
 
     def expect(self, name, check, text, others_pass=True):
-        told = self.told[name]
-        self.assertIsInstance(told, tuple, told)
-        code, report, errors = told
+        outcome = self.outcomes[name]
+        self.assertIsInstance(outcome, tuple, outcome)
+        code, report, errors = outcome
         self.assertEqual(code, 1, report + errors)
         self.assertRegex(report, rf"(?m)^FAIL +{check} .*{text}.*\. Fix: .+", errors)
         if others_pass:
             self.assertEqual(len(re.findall("^FAIL", report, flags=re.MULTILINE)), 1, report)
 
     def test_a_right_arm_passes_everything(self):
-        code, report, errors = self.told["right"]
+        code, report, errors = self.outcomes["right"]
         self.assertEqual(code, 0, report + errors)
         self.assertIn("15 passed, 0 failed, 0 not checked", report)
         self.assertIn("THE ARM MOVES", errors)
 
-    def test_wrong_beliefs(self):
-        told = self.told["beliefs"]
-        self.assertIsInstance(told, dict, told)
+    def test_wrong_settings(self):
+        outcome = self.outcomes["wrong_settings"]
+        self.assertIsInstance(outcome, dict, outcome)
         for name, check, text in (("length", "lengths", r"segment 2 is 0\.1[01]\d* m long, 0\.1300 m configured"),
                                   ("order", "order", "end of segment 2 and end of segment 3 are exchanged"),
                                   ("unseen", "bodies", r"end of segment 3 \(id 7\) never seen"),
@@ -243,7 +227,7 @@ class Preflight(unittest.TestCase):
                                   ("silent", "bodies", "no frame on ELSEWHERE"),
                                   ("up", "world axes", r"along -z .* should be \+z")):
             with self.subTest(name):
-                report, errors, code = told[name]
+                report, errors, code = outcome[name]
                 self.assertEqual(code, 1, report + errors)
                 texts = [each["text"] for each in json.loads(report)["findings"]
                          if each["check"] == check and each["verdict"] == "FAIL"]
@@ -255,15 +239,15 @@ class Preflight(unittest.TestCase):
 
     def test_units(self):
         self.expect("units", "units", "positions come in millimetres")
-        self.assertIn("no chamber was filled", self.told["units"][2])
+        self.assertIn("no chamber was filled", self.outcomes["units"][2])
 
     def test_order_of_the_quaternion(self):
         self.expect("quaternions", "quaternions", "w, x, y, z and x, y, z, w are interchanged")
 
     def test_other_sources(self):
         self.expect("optitrack", "world axes", "should be -z", others_pass=False)
-        self.assertIsInstance(self.told["vicon"], tuple, self.told["vicon"])
-        _, report, errors = self.told["vicon"]
+        self.assertIsInstance(self.outcomes["vicon"], tuple, self.outcomes["vicon"])
+        _, report, errors = self.outcomes["vicon"]
         # Not the whole report: on a busy machine a body's packet may come too late for its frame.
         for check in ("units", "order", "world axes", "lengths", "rest pose"):
             self.assertRegex(report, rf"(?m)^pass +{check} ", errors)
@@ -274,7 +258,7 @@ class Preflight(unittest.TestCase):
     def test_valve_map(self):
         self.expect("swapped_chambers", "valve map", "chamber 1 of segment 1 acts as chamber 2 of segment 1")
         self.expect("tubes", "valve map", "chamber 1 of segment 1 acts as chamber 1 of segment 2")
-        self.assertIn("valves.order: [0, 1, 2, 3, 4, 5, 6, 7]", self.told["tubes"][1])
+        self.assertIn("valves.order: [0, 1, 2, 3, 4, 5, 6, 7]", self.outcomes["tubes"][1])
 
     def test_leak(self):
         self.expect("leak", "leaks", r"chamber 2 of segment 2 reaches 0\.\d+ bar of 0\.\d+ bar")
@@ -354,4 +338,5 @@ class Jog(unittest.TestCase):
 
 
 if __name__ == "__main__":
+    Preflight.play()  # while keys are held; those tests come first
     unittest.main()

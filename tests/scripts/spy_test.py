@@ -1,4 +1,4 @@
-"""tools/spy on a display that nobody sees: what lcm-spy shows of the daemon's messages. Argument: folder of the programs."""
+"""tools/spy on a virtual display: what lcm-spy shows of the daemon's messages. Argument: folder of the programs."""
 import math
 import os
 import pathlib
@@ -60,7 +60,7 @@ class Spy(unittest.TestCase):
 
         values = {}
         for line in painted.splitlines():
-            cells = line.split("\t")  # type, field, value; or + or -, type, field with fields of its own
+            cells = line.split("\t")  # type, field, value; or + or -, type, field that has fields
             if len(cells) == 3:
                 values[cells[2] if cells[0] in "+-" else cells[1]] = cells[2]
         self.assertEqual([name for name in declared_fields("controller_status_t")

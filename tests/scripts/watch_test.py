@@ -32,7 +32,7 @@ class Watch(unittest.TestCase):
         try:
             while part := os.read(terminal, 4096):
                 shown += part
-        except OSError:  # how a terminal tells that nobody holds its other end
+        except OSError:  # how a terminal reports that its other end is closed
             pass
         self.assertEqual(watch.wait(), 0, shown)
         drawings = re.split(r"\x1b\[\d+A\x1b\[J", shown.decode().replace("\r", ""))

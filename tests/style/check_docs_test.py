@@ -17,14 +17,14 @@ softarm check config/arm.yaml
 
 
 class CheckDocs(unittest.TestCase):
-    def check(self, page, readme=None):
-        """Exit code and output of the check of a project with one page, and a README where there is one."""
+    def check(self, page, readme=None, source=""):
+        """Exit code and output of the check of a project with one page, a README where there is one, and a line in a source."""
         with tempfile.TemporaryDirectory() as name:
             root = pathlib.Path(name)
             (root / "config").mkdir()
             (root / "config/arm.yaml").write_text("name: arm\n", encoding="utf-8")
             (root / "tests").mkdir()
-            (root / "tests/some_test.cpp").write_text("TEST_F(Suite, Name) {}\n", encoding="utf-8")
+            (root / "tests/some_test.cpp").write_text(f"TEST_F(Suite, Name) {{}}\n{source}\n", encoding="utf-8")
             (root / "page.md").write_text(page, encoding="utf-8")
             (root / "examples").mkdir()
             (root / "examples/loop.cpp").write_text("int main() {\n  a();\n  b();\n}\n", encoding="utf-8")
@@ -42,6 +42,18 @@ class CheckDocs(unittest.TestCase):
         code, printed = self.check(GOOD, "```cpp\na();\nc();\n```\n")
         self.assertEqual(code, 1)
         self.assertIn("no part of a program in examples/", printed)
+
+    def test_words_are_avoided_in_sources_too(self):
+        for line in ("// Is to" + "ld.", "TEST_F(Suite, NameThatIsTo" + "ldTwice) {}", 'text("a pl' + 'ate");',
+                     "BaseSource::pl" + "ate"):
+            with self.subTest(line=line):
+                code, printed = self.check(GOOD, source=line)
+                self.assertEqual(code, 1)
+                self.assertIn("tests/some_test.cpp: line 2 says", printed)
+        for line in ('out["cure"] = fix;', "folded, retold", "base_plate: {}", "// the top plate", "a fresh one", "TEST_F(Suite, AFreshName) {}"):
+            with self.subTest(line=line):
+                code, printed = self.check(GOOD, source=line)
+                self.assertEqual(code, 0, printed)
 
     def test_every_fault_is_noticed(self):
         faults = {

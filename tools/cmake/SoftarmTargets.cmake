@@ -1,7 +1,8 @@
 # softarm_module(NAME DEPENDS libraries PRIVATE_DEPENDS libraries): a module of the tree as a separate library, so that the linker
 # checks the direction of the arrows too. softarm_program(NAME DEPENDS ...): an executable.
-# softarm_tests(LABEL MODULE [ALONE] [SLOW FILTER] DEPENDS ...): one test program from every *_test.cpp below the folder MODULE;
-# ALONE for real-time tests, which must not run in parallel with others; those whose names FILTER matches get the label slow instead.
+# softarm_tests(LABEL MODULE [REAL_TIME] [SLOW FILTER] DEPENDS ...): one test program from every *_test.cpp below the folder MODULE;
+# REAL_TIME for those that watch programs run in real time: one at a time, possibly beside a test that computes; those whose names
+# FILTER matches get the label slow instead.
 
 include(SoftarmHeaders)
 
@@ -66,7 +67,7 @@ function(softarm_optimise_test target)
 endfunction()
 
 function(softarm_tests label module)
-  cmake_parse_arguments(TESTS "ALONE" "SLOW" "DEPENDS" ${ARGN})
+  cmake_parse_arguments(TESTS "REAL_TIME" "SLOW" "DEPENDS" ${ARGN})
   file(GLOB_RECURSE sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/${module}/*_test.cpp)
   if(NOT sources)
     return()
@@ -80,12 +81,16 @@ function(softarm_tests label module)
   softarm_optimise_test(${target})
   softarm_precompile(test ${target})
   set(usual "*")
+  set(lock "")
+  if(TESTS_REAL_TIME)
+    set(lock RESOURCE_LOCK real_time COST 100)  # one after another, so the first of them begins first
+  endif()
   if(TESTS_SLOW)
     set(usual "-${TESTS_SLOW}")
     gtest_discover_tests(${target} TEST_PREFIX "${label}.${module}." PROPERTIES LABELS slow TIMEOUT 300
-      RUN_SERIAL ${TESTS_ALONE} TEST_FILTER ${TESTS_SLOW} TEST_LIST ${target}_slow
+      RUN_SERIAL ${TESTS_REAL_TIME} TEST_FILTER ${TESTS_SLOW} TEST_LIST ${target}_slow
       DISCOVERY_TIMEOUT 60 NO_PRETTY_TYPES NO_PRETTY_VALUES)
   endif()
   gtest_discover_tests(${target} TEST_PREFIX "${label}.${module}." PROPERTIES LABELS ${label} TIMEOUT 300
-    RUN_SERIAL ${TESTS_ALONE} TEST_FILTER ${usual} DISCOVERY_TIMEOUT 60 NO_PRETTY_TYPES NO_PRETTY_VALUES)
+    ${lock} TEST_FILTER ${usual} DISCOVERY_TIMEOUT 60 NO_PRETTY_TYPES NO_PRETTY_VALUES)
 endfunction()

@@ -1,4 +1,4 @@
-// softarm-dev bench: model is told here, the others beside.
+// softarm-dev bench: `model` is here, the others in files beside.
 #include <cstdio>
 #include <filesystem>
 #include <memory>

@@ -17,7 +17,7 @@ struct LoopOptions : LoopBenchOptions {
 };
 
 void bench(const LoopOptions& options) {
-  load_experiment(options.config);  // a wrong one is told by the name the user gave
+  load_experiment(options.config);  // errors name the file as the user did
   std::string text;
   {
     Progress progress(true);

@@ -38,7 +38,7 @@ struct OtherFault {
 constexpr OtherFault kOthers[] = {
     {"none", "everything goes through", "ACTIVE"},
     {"hostile", "bytes that are no message, on every channel of the daemon",
-     "refused, counted, told once a second; ACTIVE"},
+     "refused, counted, reported once a second; ACTIVE"},
     {"fragment", "second fragments that lie about their place, of frames and commands",
      "LCM 1.3.1 ends who subscribes; the arm vents; restarted: WAIT_FRAMES"},
     {"flood", "frames that repeat, as fast as they can be sent",
@@ -84,14 +84,14 @@ void send_malformed(const Experiment& experiment, long packets) {
                          chamber_count(experiment.actuation), std::random_device{}());
   RawSender sender(experiment.transport.lcm.url);
   const std::int64_t start_ns = monotonic_now_ns();
-  std::int64_t told_ns = start_ns;
+  std::int64_t reported_ns = start_ns;
   long sent = 0;
   while (stop_requested == 0 && sent < packets) {
     for (int k = 0; k < 4 && sent < packets; ++k) sent += sender.send(hostile.next()) ? 1 : 0;
     const std::int64_t now_ns = monotonic_now_ns();
-    if (now_ns - told_ns > 2'000'000'000) {
+    if (now_ns - reported_ns > 2'000'000'000) {
       say(fmt::format("softarm-dev fault: {} of {} packets sent\n", sent, packets));
-      told_ns = now_ns;
+      reported_ns = now_ns;
     }
     sleep_until_ns(now_ns + 1'000'000);
   }
@@ -143,7 +143,7 @@ int make(const FaultOptions& options) {
   }
   if (experiment.transport.mocap.source != softarm_mocap())
     throw ConfigError(options.config, 0, "daemon.mocap.source",
-                      "softarm, the only frames that this program can spoil", "another source");
+                      "softarm, the only frames that this program can corrupt", "another source");
   Fault fault = options.fault == "none" ? Fault{} : *find_fault(options.fault);
   fault.body = options.body;
   if (options.has_amount) fault.amount = options.amount;

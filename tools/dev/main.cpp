@@ -1,4 +1,4 @@
-// softarm-dev: benchmarks, faults and long runs, for who develops softarm.
+// softarm-dev: benchmarks, faults and long runs, for the development of softarm.
 #include <iostream>
 
 #include "apps/program.hpp"

@@ -16,7 +16,7 @@ namespace softarm {
 namespace {
 
 int soak(SoakOptions options, const std::string& out, bool as_json) {
-  load_experiment(options.config);  // a wrong one is told by the name the user gave
+  load_experiment(options.config);  // errors name the file as the user did
   const bool own_folder = out.empty();
   options.folder =
       own_folder ? std::filesystem::temp_directory_path() / fmt::format("softarm_soak_{}", getpid())

@@ -173,7 +173,7 @@ public final class ShowChannel {
       T answer = onEventThread(ask);
       if (answer != null) return answer;
     }
-    throw new TimeoutException("waited " + PATIENCE_MS / 1000 + " s in vain for " + what);
+    throw new TimeoutException("waited " + PATIENCE_MS / 1000 + " s for " + what);
   }
 
   private static <T> T onEventThread(Callable<T> ask) throws Exception {

@@ -1,5 +1,5 @@
-// One declaration a key of a YAML document. It reads, prints, documents (template.yaml) and
-// describes the key to editors (JSON Schema), whoever visits it (config/config_keys.hpp):
+// One declaration a key of a YAML document. Visitors (config/config_keys.hpp) use it to read, print
+// and document the key (template.yaml) and to describe it to editors (JSON Schema):
 //
 //   void describe(Keys& key, Motor& it) {
 //     key("speed_radps", it.speed_radps, above(0, 100), "of the shaft");

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <string>
 
+#include "softarm/base/output_file.hpp"
 #include "softarm/base/realtime.hpp"
 #include "softarm/config/identification_settings.hpp"
 #include "softarm/config/motion_limits.hpp"
@@ -40,6 +41,7 @@ struct Experiment : PipelineSettings {
   RunSettings run;
   IdentificationSettings identification;
   MotionLimits motion_limits;
+  Files files;             ///< that it was read from: its own and all that it includes
   std::uint64_t hash = 0;  ///< FNV-1a of the resolved configuration's text
 };
 

@@ -9,10 +9,11 @@
 
 #include "softarm/control/inverse_kinematics.hpp"
 #include "softarm/model/arm.hpp"
+#include "softarm/model/chambers.hpp"
 
 namespace softarm {
 
-/// Inputs of (17), in the case's coordinates, 2n each; gains are diagonals.
+/// Inputs of (17), in the case's coordinates, 2n or 3n each; gains are diagonals.
 struct EvalControl {
   Eigen::VectorXd reference, velocity, acceleration, kp, kd;
 };
@@ -23,7 +24,14 @@ struct EvalInverseKinematics {
   TipReference reference;
 };
 
-/// One state of one arm. `q` and `qd` are in polar [phi, theta] or in u, 2n.
+/// Chambers of every segment and the pressure in each.
+struct EvalChambers {
+  std::vector<ChamberGeometry> geometry;
+  std::vector<std::vector<double>> pressures_bar;
+};
+
+/// One state of one arm. `q` and `qd` are in polar [phi, theta] or in u, 2n, or in [u_x, u_y, e],
+/// 3n, where the arm is extensible.
 struct EvalCase {
   std::string id;
   bool polar = false;
@@ -31,19 +39,21 @@ struct EvalCase {
   Eigen::VectorXd q, qd;
   std::optional<EvalControl> control;
   std::optional<Eigen::VectorXd> tau_actuation;
+  std::optional<Eigen::Vector3d> tip_force_n;  ///< beside tau_actuation, in the world
+  std::optional<EvalChambers> chambers;
   std::optional<EvalInverseKinematics> inverse_kinematics;
 };
 
 /// One term: a number, a vector, a matrix, or one matrix per segment; no matrices at all where the
 /// quantity does not exist.
 struct EvalTerm {
-  /// How `matrices` are to be read.
-  enum class Shape { number, vector, matrix, list };
+  /// How `matrices` are to be read; `vectors`: one column per segment.
+  enum class Shape { number, vector, matrix, list, vectors };
   Shape shape = Shape::matrix;
   std::vector<Eigen::MatrixXd> matrices;
 };
 
-/// A term with its name in the table of `evaluate`.
+/// A term with its name in the table of `evaluate`; a slash is a level of the output.
 struct NamedTerm {
   std::string name;
   EvalTerm term;
@@ -66,6 +76,7 @@ enum class EvalMethod { direct, augmented };
 /// | kinetic_energy, gravity_potential | number | |
 /// | tau, tau_A_couple, tau_A_chamber | 2n | (17) before A^-1 and after it, with `control` |
 /// | qdd_couple, qdd_chamber | 2n | (16) solved, with `tau_actuation` |
+/// | chambers/generalized_force, chambers/length | 3n, n of m | with `chambers` |
 /// | qbar_dot, qbar_ddot | 2n | (21), with `inverse_kinematics` |
 ///
 /// @throws std::invalid_argument if the augmented robot cannot stand for the case: it knows polar

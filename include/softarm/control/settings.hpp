@@ -63,7 +63,7 @@ struct ControllerSettings {
   TaskSpaceSettings task_space;
 };
 
-/// One phase of a sequence; the last one lasts for ever.
+/// One phase of a sequence; the last one has no end.
 struct ReferencePhase {
   ReferenceKind kind;
   double duration_s = 0.0;  ///< ignored for the last phase

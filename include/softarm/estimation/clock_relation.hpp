@@ -21,7 +21,7 @@ enum class ClockMode {
 ///  - Jitter of the network drops out; a drift between the clocks of 100 ppm costs at most 0.2 ms.
 ///  - A sender's clock set forward is followed at once. Set back, its stamps run backwards, and the
 ///  relation starts
-///    afresh; a step back of less than a frame period is not seen and makes frames that much older
+///    again; a step back of less than a frame period is not seen and makes frames that much older
 ///    for two seconds.
 ///  - Until the window has seen an undelayed frame, captures come out too late by the least delay
 ///  so far.
@@ -40,7 +40,7 @@ class ClockRelation {
   /// Forgets what was learnt: for a gap in which anything may have happened.
   void reset() noexcept;
 
-  /// Times the relation started afresh because stamps ran backwards.
+  /// Times the relation started again because stamps ran backwards.
   std::int64_t clock_jumps() const noexcept { return clock_jumps_; }
 
  private:

@@ -65,7 +65,7 @@ class CurvatureFilter {
   /// Takes one accepted frame. `known`, if any, is the expected motion at `capture_ns`.
   /// A capture that is not later than the last one is ignored. A segment that the estimate does not
   /// observe is predicted on; after more than predicted_frames such frames in a row it is no longer
-  /// valid and starts anew when seen again. So does every segment after a gap of more than
+  /// valid and starts from rest when seen again. So does every segment after a gap of more than
   /// reset_gap_s(), or of another known-motion size.
   void update(std::int64_t capture_ns, const CurvatureEstimate& estimate,
               const KnownMotion* known = nullptr) noexcept;

@@ -1,4 +1,4 @@
-// The gate between the wire and the estimator: which frames may be believed.
+// The gate between the wire and the estimator: which frames may be used.
 #pragma once
 
 #include <array>
@@ -16,7 +16,7 @@ enum class FrameVerdict {
   repeated,      ///< the number of the newest frame again
   out_of_order,  ///< an older number, or a capture time that is not later than the last accepted
                  ///< one
-  sender_restarted,  ///< numbers began anew; dropped, the next frame is judged afresh
+  sender_restarted,  ///< numbers began again; dropped, the next frame starts a new sequence
   wrong_size,        ///< not the number of segments of the arm
   not_finite,        ///< NaN or infinity in a body that claims to be valid
   bad_quaternion,    ///< norm off one by more than quaternion_tolerance

@@ -8,7 +8,7 @@
 
 namespace softarm {
 
-/// A of one segment, 2 x 2. `couple`: (15) with its transpose mended, det = c1 = sin theta / theta,
+/// A of one segment, 2 x 2. `couple`: (15), transpose corrected, det = c1 = sin theta / theta,
 /// singular at theta = pi. `chamber`: [[0, 1], [-1, 0]] everywhere.
 Eigen::Matrix2d actuation_matrix(ActuationModel model, const Eigen::Vector2d& u_rad) noexcept;
 
@@ -23,7 +23,8 @@ Eigen::Vector2d solve_actuation(ActuationModel model, const Eigen::Vector2d& u_r
                                 const Eigen::Vector2d& force_nm,
                                 double min_determinant = kMinActuationDeterminant) noexcept;
 
-/// out = A tau_A for the whole arm, 2n each, in N m.
+/// out = A tau_A for the whole arm, 2n each, in N m; with [tau_x, tau_y, N] a segment, 3n, where
+/// segments stretch: A is then [[0, 1, 0], [-1, 0, 0], [0, 0, 1]], and `couple` gives NaN.
 void apply_actuation(const ArmParameters& arm, ConstVectorRef u, ConstVectorRef tau_actuation_nm,
                      VectorRef out) noexcept;
 

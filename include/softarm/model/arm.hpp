@@ -1,4 +1,4 @@
-// The constant description of a soft arm and the vector types every room shares.
+// The constant description of a soft arm and the vector types that every module shares.
 #pragma once
 
 #include <Eigen/Core>
@@ -28,15 +28,22 @@ struct SegmentParameters {
   /// Of the round cross-section, whose rotary inertia mu r^2/4 a unit of arc the paper leaves out;
   /// 0 leaves it out too and costs nothing. Distributed mass only: a point has no cross-section.
   double radius_m = 0.0;
+  /// Along the axis, for arms that are `extensible` only. The defaults are those of a solid rod that
+  /// bends as the values above: k_a / k = beta_a / beta = area / second moment of area.
+  double axial_stiffness_n_per_m = 4000.0;  ///< k_a
+  double axial_damping_ns_per_m = 185.0;    ///< beta_a
+  /// A segment of an extensible arm that does not stretch: its e is 0 for good and its e'' is 0
+  /// whatever acts on it; the e row of the inverse dynamics is the force that holds it.
+  bool constant_length = false;
 };
 
 /// Where a segment's mass sits. `point` is the paper's (all of it at the centre of mass, no
 /// rotational inertia); `distributed` spreads it homogeneously along the arc.
 enum class MassModel { point, distributed };
 
-/// Which input matrix A maps tau_A to generalized forces: `couple` is the paper's (15) with its
-/// transpose mended (singular at theta = pi), `chamber` the body-following moment of chambers and
-/// tendons (never singular).
+/// Which input matrix A maps tau_A to generalized forces: `couple` is the paper's (15),
+/// transpose corrected (singular at theta = pi); `chamber` the body-following moment of chambers
+/// and tendons (never singular).
 enum class ActuationModel { chamber, couple };
 
 /// An arm of n segments hanging from, or standing on, a base frame S_0. The straight arm points
@@ -49,6 +56,11 @@ struct ArmParameters {
   Eigen::Matrix3d base_rotation = Eigen::Vector3d(1.0, -1.0, -1.0).asDiagonal();
   Eigen::Vector3d base_position_m = Eigen::Vector3d::Zero();
   Eigen::Vector3d gravity_mps2 = Eigen::Vector3d(0.0, 0.0, -9.81);  ///< in the world frame
+  /// Segments that stretch have three coordinates, [u_x, u_y, e] with e the elongation in m, and
+  /// tau_A = [tau_x, tau_y, N] with N the axial force in N, positive where it lengthens; `length_m`
+  /// is then the length at rest, and length_m + e > 0 the present one, uniform along the arc. Mass
+  /// stretches with the segment, radius_m stays. All 2n below become 3n. Only `chamber` actuation.
+  bool extensible = false;
 
   /// Does a cross-section have rotary inertia?
   bool is_thick() const {
@@ -57,7 +69,12 @@ struct ArmParameters {
                        [](const SegmentParameters& segment) { return segment.radius_m > 0.0; });
   }
   int size() const { return static_cast<int>(segments.size()); }
-  int dof() const { return 2 * size(); }
+  int segment_dof() const { return extensible ? 3 : 2; }
+  int dof() const { return segment_dof() * size(); }
 };
+
+/// For what does not know segments that stretch. @throw std::invalid_argument for an arm that is
+/// extensible. @param who begins the message.
+void expect_constant_length(const ArmParameters& arm, const char* who);
 
 }  // namespace softarm

@@ -31,7 +31,7 @@ class SerialRobot;
 /// NaN out.
 class AugmentedRobot {
  public:
-  /// @throws std::invalid_argument without segments or with distributed mass.
+  /// @throws std::invalid_argument without segments, with distributed mass, or if the arm stretches.
   explicit AugmentedRobot(const ArmParameters& arm);
   ~AugmentedRobot();
   AugmentedRobot(AugmentedRobot&&) noexcept;

@@ -54,7 +54,7 @@ void dynamics_to_polar(ConstVectorRef q, ConstVectorRef velocity, Eigen::Ref<Eig
                        Eigen::Ref<Eigen::MatrixXd> C, VectorRef G) noexcept;
 
 /// A of one segment in polar, exactly: [[-r cos phi, -r sin phi], [-sin phi, cos phi]], r = sin
-/// theta (`couple`, the paper's (15) mended) or theta (`chamber`).
+/// theta (`couple`, the paper's (15) corrected) or theta (`chamber`).
 Eigen::Matrix2d polar_actuation_matrix(ActuationModel model, const Eigen::Vector2d& q_rad) noexcept;
 
 }  // namespace softarm

@@ -1,11 +1,14 @@
-// Checks that the arm follows its commands: measured against commanded pressures, curvature against
-// pressures, and against the reference.
+// Checks that the arm follows its commands and is the one configured: measured against commanded
+// pressures, curvature against pressures and against the reference, measured against configured
+// lengths.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
 #include "softarm/actuation/pressure_allocator.hpp"
+#include "softarm/estimation/curvature_estimator.hpp"
 #include "softarm/model/arm.hpp"
 #include "softarm/model/dynamics.hpp"
 #include "softarm/runtime/settings.hpp"
@@ -127,6 +130,40 @@ class OscillationWatch {
   int longest_ticks_, half_periods_;
   std::vector<Coordinate> coordinates_;
   bool oscillates_ = false;
+};
+
+/// The controller's model has segments of constant length. A measured length that is another one for
+/// long means an arm that stretches, a marker frame that slipped or a wrong number in the
+/// configuration: the tip is then not where it is reported. No allocation, no clock.
+class LengthWatch {
+ public:
+  LengthWatch(const SafetySettings& settings, const ArmParameters& arm);
+
+  /// The lengths of an accepted frame. A length whose standard deviation is above a third of a limit
+  /// is no evidence for or against it.
+  void judge(std::int64_t capture_ns, const CurvatureEstimate& estimate) noexcept;
+
+  /// Some segment's length was off by more than the warning throughout the settling time.
+  bool warns() const noexcept { return warning_.exceeded; }
+  /// The same of the fault.
+  bool out_of_tolerance() const noexcept { return fault_.exceeded; }
+  /// Some segment's length was off by more than the fault when it was last measured.
+  bool beyond() const noexcept { return fault_.beyond; }
+  /// Starts again, for a gap in which anything may have happened.
+  void reset() noexcept;
+
+ private:
+  struct Limit {
+    double relative;  ///< 0: none
+    bool exceeded = false;
+    bool beyond = false;
+    std::array<std::int64_t, kMaxSegments> since_ns{};  ///< kNever while within the limit
+  };
+  void judge(std::int64_t capture_ns, const CurvatureEstimate& estimate, Limit& limit) noexcept;
+
+  std::vector<double> length_m_;
+  std::int64_t settling_ns_;
+  Limit warning_, fault_;
 };
 
 }  // namespace softarm

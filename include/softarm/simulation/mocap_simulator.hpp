@@ -16,8 +16,8 @@ namespace softarm {
 
 /// Captures frames at a fixed rate and hands each out after its latency. Time is an argument; frame
 /// k is captured at start + round(k 1e9 / rate) ns, so that the rate does not drift. Same seed,
-/// same frames, bit for bit; noise and dropouts draw from sequences of their own, so switching one
-/// does not change the other.
+/// same frames, bit for bit; noise and dropouts draw from separate sequences, so switching one does
+/// not change the other.
 class MocapSimulator {
  public:
   /// @param segments number of measured segment ends, 1..kMaxSegments.
@@ -38,14 +38,14 @@ class MocapSimulator {
   /// When the oldest frame under way arrives; kForever if there is none.
   std::int64_t next_arrival_ns() const noexcept;
 
-  /// The oldest frame that has arrived by `now_ns`, if any, in order of capture. Frames nobody
-  /// fetches are lost oldest first once the queue (as many as the latency needs, plus kSlack) is
-  /// full.
+  /// The oldest frame that has arrived by `now_ns`, if any, in order of capture. Frames that
+  /// are not fetched are lost oldest first once the queue (as many as the latency needs, plus
+  /// kSlack) is full.
   bool receive(std::int64_t now_ns, MocapFrame& frame) noexcept;
 
   std::int64_t captured() const noexcept { return captured_; }  ///< frames, dropped ones included
   std::int64_t dropped() const noexcept { return dropped_; }    ///< frames that dropped out
-  std::int64_t overwritten() const noexcept { return overwritten_; }  ///< frames nobody fetched
+  std::int64_t overwritten() const noexcept { return overwritten_; }  ///< frames not fetched
 
   static constexpr int kSlack = 16;  ///< frames that may wait to be fetched
 

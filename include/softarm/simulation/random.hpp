@@ -7,7 +7,7 @@
 
 namespace softarm {
 
-/// xoshiro256++ seeded by splitmix64, with uniform and normal numbers of its own.
+/// xoshiro256++ seeded by splitmix64, with its own uniform and normal numbers.
 class RandomNumbers {
  public:
   /// @param stream selects one of the independent sequences of a seed (noise, dropouts, ...).

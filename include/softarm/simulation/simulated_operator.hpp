@@ -1,4 +1,4 @@
-// Who stands beside an arm that nobody stands beside: in lock step and on recorded frames.
+// The operator's part of a run without an operator: in lock step and on recorded frames.
 #pragma once
 
 #include "softarm/runtime/control_pipeline.hpp"

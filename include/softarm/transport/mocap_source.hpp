@@ -1,5 +1,5 @@
-// The one door through which motion capture comes in, whoever sends it: packets -> frames. And the
-// other way round, for a simulated arm.
+// Where motion capture comes in, from every kind of source: packets -> frames. And frames ->
+// packets, for a simulated arm.
 #pragma once
 
 #include <cstddef>
@@ -47,7 +47,7 @@ class MocapSource {
   MocapReceipt take(std::size_t channel, std::span<const std::byte> bytes, std::int64_t arrival_ns,
                     MocapFrame& frame) noexcept;
 
-  /// A frame that waits for a body in vain: true, and the frame, once it has waited long enough.
+  /// A frame of which a body is missing: true, and the frame, once it has waited long enough.
   /// For sources with a channel a body, once a tick; others never have one.
   bool overdue(std::int64_t now_ns, MocapFrame& frame) noexcept;
 

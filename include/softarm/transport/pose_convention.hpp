@@ -1,4 +1,4 @@
-// What the numbers of a body's pose mean to whoever sends them, and what they are to us.
+// From the convention in which a source sends the pose of a body to ours: SI units, world frame.
 #pragma once
 
 #include <Eigen/Geometry>

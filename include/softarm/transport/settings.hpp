@@ -52,16 +52,16 @@ struct MarkerFrameSettings {
 };
 
 /// The channel of a body where every body has a separate one (MocapSourceKind::rigid_transform).
-inline std::string body_channel(const LcmSettings& lcm, const MarkerFrameSettings& plate) {
-  return lcm.mocap_channel + "_" + plate.name;
+inline std::string body_channel(const LcmSettings& lcm, const MarkerFrameSettings& frame) {
+  return lcm.mocap_channel + "_" + frame.name;
 }
 
 /// Which bodies of the motion-capture frame carry the base and the segment ends.
 struct BodySettings {
-  int base_id = 0;                      ///< -1: the base is fixed by arm.base
-  std::vector<int> segment_ids;         ///< n ids, from the base to the tip
-  MarkerFrameSettings base_plate = {};  ///< unused where the base is fixed
-  std::vector<MarkerFrameSettings> segment_plates =
+  int base_id = 0;                             ///< -1: the base is fixed by arm.base
+  std::vector<int> segment_ids;                ///< n ids, from the base to the tip
+  MarkerFrameSettings base_marker_frame = {};  ///< unused where the base is fixed
+  std::vector<MarkerFrameSettings> segment_marker_frames =
       {};  ///< n, or none: S_i are then the body frames
 };
 

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <map>
 #include <memory>
+#include <optional>
 #include <stdexcept>
 #include <vector>
 
@@ -13,11 +14,11 @@
 #include "apps/progress.hpp"
 #include "apps/signals.hpp"
 #include "apps/softarm/commands.hpp"
+#include "softarm/base/output_file.hpp"
 #include "softarm/base/version.hpp"
 #include "softarm/client/arm_client.hpp"
 #include "softarm/commissioning/calibration/rest_calibration.hpp"
 #include "softarm/config/load.hpp"
-#include "softarm/recording/experiment_log.hpp"
 #include "softarm/transport/mocap_source.hpp"
 
 namespace softarm {
@@ -30,17 +31,17 @@ constexpr double kNoPressure_bar = 0.01;
 struct CalibrateOptions {
   std::string config, output;
   double duration_s = 5.0;
-  BaseSource base = BaseSource::plate;
+  BaseSource base = BaseSource::marker_frame;
 };
 
 /// Body poses: as the source sends them, in our world, without the configured marker frames.
-Experiment without_plates(Experiment experiment) {
-  const auto clear = [](MarkerFrameSettings& plate) {
-    plate.position_m.setZero();
-    plate.rotation_rad.setZero();
+Experiment without_marker_frames(Experiment experiment) {
+  const auto clear = [](MarkerFrameSettings& frame) {
+    frame.position_m.setZero();
+    frame.rotation_rad.setZero();
   };
-  clear(experiment.transport.bodies.base_plate);
-  for (MarkerFrameSettings& plate : experiment.transport.bodies.segment_plates) clear(plate);
+  clear(experiment.transport.bodies.base_marker_frame);
+  for (MarkerFrameSettings& frame : experiment.transport.bodies.segment_marker_frames) clear(frame);
   return experiment;
 }
 
@@ -49,7 +50,7 @@ std::vector<MocapFrame> watch(const Experiment& experiment, double duration_s) {
   std::vector<MocapFrame> frames;
   std::int64_t first_ns = 0;
   double most_bar = 0.0;
-  ArmClient client(without_plates(experiment));
+  ArmClient client(without_marker_frames(experiment));
   client.on_frame([&](const CapturedFrame& captured) {
     if (frames.empty()) first_ns = captured.arrival_ns;
     frames.push_back(captured.frame);
@@ -83,19 +84,22 @@ std::vector<MocapFrame> watch(const Experiment& experiment, double duration_s) {
 int calibrate(const CalibrateOptions& options) {
   namespace fs = std::filesystem;
   const Experiment experiment = load_experiment(options.config);
+  std::optional<OutputFile> output;  // refused before the arm is watched, not after
+  if (!options.output.empty()) output.emplace(options.output, experiment.files);
   catch_stop_signals();
   const auto frames = watch(experiment, options.duration_s);
   const RestCalibration found = calibrate_rest(experiment, frames, options.base);
   fmt::print("{}", calibration_text(experiment, found));
-  if (options.output.empty()) return kExitOk;
+  if (!output) return kExitOk;
   const std::string note = fmt::format(
       "Marker frames, S_i on the marker bodies: softarm calibrate {}, {} frames at rest.",
       version_text(), found.body.back().frames);
-  const fs::path folder = fs::absolute(options.output).parent_path();
-  write_text(options.output,
-             calibrated_yaml(experiment, found, note,
-                             fs::proximate(fs::absolute(options.config), folder).string()));
-  load_experiment(options.output);
+  const fs::path folder = fs::absolute(output->partial()).parent_path();
+  output->write(calibrated_yaml(experiment, found, note,
+                                fs::proximate(fs::absolute(options.config), folder).string()));
+  output->flush();
+  load_experiment(output->partial());
+  output->commit();
   fmt::print("{} has the marker frames: softarm check {}\n", options.output, options.output);
   return kExitOk;
 }
@@ -117,7 +121,7 @@ void add_calibrate_command(CLI::App& app) {
           "source of the arm's axis at the base: its marker frame as configured (plate), or "
           "arm.base.rotation (arm)")
       ->transform(CLI::CheckedTransformer(std::map<std::string, BaseSource>{
-          {"plate", BaseSource::plate}, {"arm", BaseSource::arm}}));
+          {"plate", BaseSource::marker_frame}, {"arm", BaseSource::arm}}));
   command->callback([options] {
     if (const int code = calibrate(*options); code != kExitOk) throw CLI::RuntimeError(code);
   });

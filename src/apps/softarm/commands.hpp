@@ -18,7 +18,7 @@ void add_eval_command(CLI::App& app);
 /// softarm identify CONFIG [--live | --log LOG] [--output FILE] [--seeds N]
 void add_identify_command(CLI::App& app);
 
-/// softarm import CSV MAP.yaml --out LOG
+/// softarm import CSV [MAP.yaml --out LOG]
 void add_import_command(CLI::App& app);
 
 /// softarm jog CONFIG SEGMENT CHAMBER PRESSURE
@@ -32,6 +32,9 @@ void add_report_command(CLI::App& app);
 
 /// softarm run CONFIG [--out DIR] [--duration S] [--seed N]
 void add_run_command(CLI::App& app);
+
+/// softarm view CONFIG [--log LOG] [--port PORT] [--control]
+void add_view_command(CLI::App& app);
 
 /// softarm watch CONFIG [--out DIR] [--duration S]
 void add_watch_command(CLI::App& app);

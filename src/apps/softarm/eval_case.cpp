@@ -2,89 +2,14 @@
 #include "apps/softarm/eval_case.hpp"
 
 #include <fmt/format.h>
-#include <yaml-cpp/yaml.h>
 
-#include <cmath>
-
+#include "apps/softarm/eval_place.hpp"
 #include "softarm/config/config_error.hpp"
 
 namespace softarm {
 namespace {
 
 constexpr int kMaxEvalSegments = 1000;
-
-/// A node with its location, for messages.
-struct Place {
-  const std::string& file;
-  YAML::Node node;
-  std::string key;
-
-  [[noreturn]] void fail(const std::string& expected, const std::string& got) const {
-    const YAML::Mark mark = node.IsDefined() ? node.Mark() : YAML::Mark::null_mark();
-    throw ConfigError(file, mark.is_null() ? 0 : mark.line + 1, key, expected, got);
-  }
-
-  std::string what() const {
-    if (!node.IsDefined()) return "nothing";
-    switch (node.Type()) {
-      case YAML::NodeType::Null:
-        return "null";
-      case YAML::NodeType::Scalar:
-        return fmt::format("'{}'", node.Scalar());
-      case YAML::NodeType::Sequence:
-        return fmt::format("a list of {}", node.size());
-      default:
-        return node.IsMap() ? "a map" : "nothing";
-    }
-  }
-
-  bool has(const std::string& name) const { return node[name] && !node[name].IsNull(); }
-
-  Place at(const std::string& name) const {
-    const std::string full = key.empty() ? name : key + "." + name;
-    if (!node.IsMap()) fail("a map", what());
-    if (!node[name]) Place{file, node, full}.fail("a value", "nothing (missing key)");
-    return {file, node[name], full};
-  }
-  Place at(std::size_t index) const {
-    return {file, node[index], fmt::format("{}[{}]", key, index)};
-  }
-
-  double number() const {
-    double value = 0.0;
-    if (!node.IsScalar() || !YAML::convert<double>::decode(node, value)) fail("a number", what());
-    return value;
-  }
-  double positive() const {
-    const double value = number();
-    if (!(value > 0.0) || !std::isfinite(value)) fail("a number > 0", what());
-    return value;
-  }
-  double non_negative() const {
-    const double value = number();
-    if (!(value >= 0.0) || !std::isfinite(value)) fail("a number >= 0", what());
-    return value;
-  }
-  void expect_list(std::size_t size) const {
-    if (!node.IsSequence() || node.size() != size) fail(fmt::format("a list of {}", size), what());
-  }
-  Eigen::VectorXd vector(int size) const {
-    expect_list(static_cast<std::size_t>(size));
-    Eigen::VectorXd result(size);
-    for (int i = 0; i < size; ++i) result(i) = at(static_cast<std::size_t>(i)).number();
-    return result;
-  }
-  Eigen::Matrix3d rotation() const {
-    expect_list(3);
-    Eigen::Matrix3d R;
-    for (int i = 0; i < 3; ++i) R.row(i) = at(static_cast<std::size_t>(i)).vector(3).transpose();
-    constexpr double kTolerance = 1e-6;
-    if (!((R * R.transpose()).isIdentity(kTolerance) && R.determinant() > 0.0)) {
-      fail("a rotation matrix (orthonormal rows, determinant 1)", "another matrix");
-    }
-    return R;
-  }
-};
 
 int read_size(const Place& config) {
   const Place place = config.at("n");
@@ -96,8 +21,9 @@ int read_size(const Place& config) {
   return n;
 }
 
-ArmParameters read_arm(const Place& config) {
+ArmParameters read_arm(const Place& config, bool extensible) {
   ArmParameters arm;
+  arm.extensible = extensible;
   const auto n = static_cast<std::size_t>(read_size(config));
   const Place L = config.at("L"), mu = config.at("mu"), k = config.at("k"),
               beta = config.at("beta");
@@ -108,19 +34,66 @@ ArmParameters read_arm(const Place& config) {
                             .stiffness_nm_per_rad = k.at(i).non_negative(),
                             .damping_nms_per_rad = beta.at(i).non_negative()});
   }
+  if (extensible) {
+    const Place k_a = config.at("k_a"), beta_a = config.at("beta_a");
+    for (const Place* list : {&k_a, &beta_a}) list->expect_list(n);
+    for (std::size_t i = 0; i < n; ++i) {
+      arm.segments[i].axial_stiffness_n_per_m = k_a.at(i).non_negative();
+      arm.segments[i].axial_damping_ns_per_m = beta_a.at(i).non_negative();
+    }
+  }
   arm.gravity_mps2 = config.at("gravity").vector(3);
   arm.base_rotation = config.at("base_rotation").rotation();
   arm.base_position_m = config.at("base_position").vector(3);
   return arm;
 }
 
-bool read_polar(const Place& config) {
+std::string read_coordinates(const Place& config) {
   const Place place = config.at("coords");
   const std::string name = place.node.IsScalar() ? place.node.Scalar() : "";
-  if (name != "polar" && name != "cartesian_u") {
-    place.fail("'polar' or 'cartesian_u'", place.what());
+  if (name != "polar" && name != "cartesian_u" && name != "cartesian_ue") {
+    place.fail("'polar', 'cartesian_u' or 'cartesian_ue'", place.what());
   }
-  return name == "polar";
+  return name;
+}
+
+/// [u_x, u_y, e] of every segment, none shorter than nothing.
+void expect_lengths(const Place& q, const EvalCase& read) {
+  for (int i = 0; i < read.arm.size(); ++i) {
+    const int e = 3 * i + 2;
+    const double length = read.arm.segments[static_cast<std::size_t>(i)].length_m;
+    if (length + read.q(e) <= 0.0) {
+      const Place place = q.at(static_cast<std::size_t>(e));
+      place.fail(fmt::format("an elongation above -{} m, the length at rest", length),
+                 place.what());
+    }
+  }
+}
+
+EvalChambers read_chambers(const Place& geometry, const Place& pressures, std::size_t segments) {
+  EvalChambers result;
+  geometry.expect_list(segments);
+  pressures.expect_list(segments);
+  for (std::size_t i = 0; i < segments; ++i) {
+    const Place one = geometry.at(i);
+    result.geometry.push_back({.angles_rad = one.at("chi").numbers(),
+                               .offset_m = one.at("r").non_negative(),
+                               .area_n_per_bar = one.at("a").positive()});
+    pressures.at(i).expect_list(result.geometry.back().angles_rad.size());
+    result.pressures_bar.push_back(pressures.at(i).numbers());
+  }
+  return result;
+}
+
+EvalInverseKinematics read_inverse_kinematics(const Place& ik) {
+  EvalInverseKinematics inputs;
+  inputs.gains = {.lambda_1ps = ik.at("lambda1").number(),
+                  .lambda_position_1ps2 = ik.at("lambda_p").number(),
+                  .lambda_velocity_1ps = ik.at("lambda_d").number()};
+  inputs.reference = {.position_m = ik.at("p_d").vector(3),
+                      .velocity_mps = ik.at("pd_dot").vector(3),
+                      .acceleration_mps2 = ik.at("pd_ddot").vector(3)};
+  return inputs;
 }
 
 EvalCase read_case(const Place& place) {
@@ -129,10 +102,12 @@ EvalCase read_case(const Place& place) {
   if (!id.node.IsScalar()) id.fail("a name", id.what());
   result.id = id.node.Scalar();
   const Place config = place.at("config");
-  result.polar = read_polar(config);
-  result.arm = read_arm(config);
+  const std::string coordinates = read_coordinates(config);
+  result.polar = coordinates == "polar";
+  result.arm = read_arm(config, coordinates == "cartesian_ue");
   const int dof = result.arm.dof();
   result.q = place.at("q").vector(dof);
+  if (result.arm.extensible) expect_lengths(place.at("q"), result);
   result.qd = place.at("qd").vector(dof);
   if (place.has("control")) {
     const Place control = place.at("control");
@@ -143,18 +118,18 @@ EvalCase read_case(const Place& place) {
                                  .kd = control.at("KD").vector(dof)};
   }
   if (place.has("forward")) {
-    result.tau_actuation = place.at("forward").at("tau_A").vector(dof);
+    const Place forward = place.at("forward");
+    result.tau_actuation = forward.at("tau_A").vector(dof);
+    if (forward.has("f_tip")) result.tip_force_n = forward.at("f_tip").vector(3);
+  }
+  if (result.arm.extensible && place.has("chambers")) {
+    result.chambers = read_chambers(config.at("chambers"), place.at("chambers").at("pressure"),
+                                    result.arm.segments.size());
   }
   if (place.has("ik")) {
-    const Place ik = place.at("ik");
-    EvalInverseKinematics inputs;
-    inputs.gains = {.lambda_1ps = ik.at("lambda1").number(),
-                    .lambda_position_1ps2 = ik.at("lambda_p").number(),
-                    .lambda_velocity_1ps = ik.at("lambda_d").number()};
-    inputs.reference = {.position_m = ik.at("p_d").vector(3),
-                        .velocity_mps = ik.at("pd_dot").vector(3),
-                        .acceleration_mps2 = ik.at("pd_ddot").vector(3)};
-    result.inverse_kinematics = inputs;
+    // J^+ of (21) would count a metre as a radian.
+    if (result.arm.extensible) place.at("ik").fail("coords polar or cartesian_u", coordinates);
+    result.inverse_kinematics = read_inverse_kinematics(place.at("ik"));
   }
   return result;
 }

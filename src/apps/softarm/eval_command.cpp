@@ -35,10 +35,13 @@ Json term_json(const EvalTerm& term) {
     case EvalTerm::Shape::matrix:
       return matrix_json(term.matrices.front());
     case EvalTerm::Shape::list:
+    case EvalTerm::Shape::vectors:
       break;
   }
   Json list = Json::array();
-  for (const auto& m : term.matrices) list.push_back(matrix_json(m));
+  for (const auto& m : term.matrices) {
+    list.push_back(term.shape == EvalTerm::Shape::list ? matrix_json(m) : vector_json(m.col(0)));
+  }
   return list;
 }
 
@@ -47,7 +50,9 @@ std::string evaluate_file(const std::string& file, MassModel mass, EvalMethod me
   for (EvalCase& one : read_eval_cases(file)) {
     one.arm.mass = mass;
     Json& terms = cases.emplace_back(Json{{"id", one.id}});
-    for (const NamedTerm& term : evaluate(one, method)) terms[term.name] = term_json(term.term);
+    for (const NamedTerm& term : evaluate(one, method)) {
+      terms[Json::json_pointer("/" + term.name)] = term_json(term.term);
+    }
   }
   return Json{{"cases", std::move(cases)}}.dump() + "\n";
 }

@@ -83,7 +83,7 @@ class Jog {
     while (stop_requested == 0) {
       const std::int64_t now_ns = client_.now_ns();
       // Keys queued while the program was stopped (Ctrl-Z, fg) are not being held.
-      if (now_ns - std::exchange(before_ns, now_ns) > KeyHold::kNext_ns) terminal.begin_anew();
+      if (now_ns - std::exchange(before_ns, now_ns) > KeyHold::kNext_ns) terminal.restart();
       const int key = terminal.key();
       if (key == kQuit || key == RawTerminal::kGone) return;
       if (key != 0) hold.event(now_ns);

@@ -16,6 +16,7 @@ int main(int argc, char** argv) {
   softarm::add_replay_command(app);
   softarm::add_report_command(app);
   softarm::add_run_command(app);
+  softarm::add_view_command(app);
   softarm::add_watch_command(app);
   softarm::add_operator_commands(app);
   return softarm::run_program(argc, argv, app, [&app]() -> int {

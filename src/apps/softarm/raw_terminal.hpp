@@ -29,7 +29,7 @@ class RawTerminal {
 
   /// Discards pending keys and sets raw mode again: a shell resets the terminal of a program that
   /// was stopped.
-  void begin_anew() const { tcsetattr(STDIN_FILENO, TCSAFLUSH, &raw_); }
+  void restart() const { tcsetattr(STDIN_FILENO, TCSAFLUSH, &raw_); }
 
   /// The newest key since the last call, 0 if there was none, kGone if the terminal is gone.
   static constexpr int kGone = -1;

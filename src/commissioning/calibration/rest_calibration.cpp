@@ -16,8 +16,8 @@ namespace {
 
 constexpr std::size_t kFewestFrames = 50;
 
-Eigen::Isometry3d pose_of(const MarkerFrameSettings& plate) {
-  return to_isometry(pose_on_body(plate));
+Eigen::Isometry3d pose_of(const MarkerFrameSettings& frame) {
+  return to_isometry(pose_on_body(frame));
 }
 
 /// The shape that gravity gives the arm without pressure.
@@ -37,8 +37,8 @@ std::vector<RestReading> read_segments(const Experiment& experiment, const BodyS
   frame.segments = arm.size();
   for (std::size_t i = 0; i < mean.size(); ++i) {
     Eigen::Isometry3d pose = mean[i];
-    if (i > 0) pose = pose * pose_of(bodies.segment_plates[i - 1]);
-    if (i == 0 && bodies.base_id >= 0) pose = pose * pose_of(bodies.base_plate);
+    if (i > 0) pose = pose * pose_of(bodies.segment_marker_frames[i - 1]);
+    if (i == 0 && bodies.base_id >= 0) pose = pose * pose_of(bodies.base_marker_frame);
     frame.body[i] = {pose.translation(), Eigen::Quaterniond(pose.linear()), true};
   }
   CurvatureEstimate estimate;
@@ -63,17 +63,18 @@ BodySettings plates_from(const Experiment& experiment, const Eigen::VectorXd& re
                          std::span<const Eigen::Isometry3d> mean, BaseSource source) {
   BodySettings out = experiment.transport.bodies;
   const bool fixed = out.base_id < 0;
-  Eigen::Isometry3d base = fixed ? mean[0] : mean[0] * pose_of(out.base_plate);
+  Eigen::Isometry3d base = fixed ? mean[0] : mean[0] * pose_of(out.base_marker_frame);
   if (!fixed && source == BaseSource::arm) base = levelled(base, experiment.arm);
   ArmParameters at_base = experiment.arm;
   at_base.base_position_m = base.translation();
   at_base.base_rotation = base.linear();
   const std::vector<Eigen::Isometry3d> found = frames_on_bodies(at_base, rest_u_rad, mean);
   if (!fixed && source == BaseSource::arm)
-    out.base_plate = with_pose_on_body(out.base_plate, found[0]);
-  out.segment_plates.resize(found.size() - 1);
+    out.base_marker_frame = with_pose_on_body(out.base_marker_frame, found[0]);
+  out.segment_marker_frames.resize(found.size() - 1);
   for (std::size_t i = 1; i < found.size(); ++i)
-    out.segment_plates[i - 1] = with_pose_on_body(out.segment_plates[i - 1], found[i]);
+    out.segment_marker_frames[i - 1] =
+        with_pose_on_body(out.segment_marker_frames[i - 1], found[i]);
   return out;
 }
 
@@ -165,11 +166,11 @@ std::string plates_text(const BodySettings& before, const RestCalibration& found
       "\nmarker frames: pose of S_i on its body, and the distance from the configured one\n";
   for (std::size_t i = before.base_id < 0 ? 1 : 0; i < found.body.size(); ++i) {
     const MarkerFrameSettings& now =
-        i == 0 ? found.bodies.base_plate : found.bodies.segment_plates[i - 1];
-    MarkerFrameSettings was = before.base_plate;
+        i == 0 ? found.bodies.base_marker_frame : found.bodies.segment_marker_frames[i - 1];
+    MarkerFrameSettings was = before.base_marker_frame;
     if (i > 0)
-      was =
-          i <= before.segment_plates.size() ? before.segment_plates[i - 1] : MarkerFrameSettings{};
+      was = i <= before.segment_marker_frames.size() ? before.segment_marker_frames[i - 1]
+                                                     : MarkerFrameSettings{};
     const Eigen::Isometry3d from = pose_of(was).inverse() * pose_of(now);
     const Eigen::Vector3d mm = 1e3 * now.position_m, mrad = 1e3 * now.rotation_rad;
     text += fmt::format(
@@ -218,12 +219,12 @@ RestCalibration calibrate_rest(const Experiment& experiment, const std::vector<M
   const auto second = means(poses, fixed, count / 2, count - count / 2);
   out.bodies = plates_from(experiment, out.rest_u_rad, all, base);
   BodySettings configured = experiment.transport.bodies;
-  configured.segment_plates.resize(poses.size() - 1);
+  configured.segment_marker_frames.resize(poses.size() - 1);
   out.before = read_segments(experiment, configured, all);
   out.after =
       read_segments(experiment, plates_from(experiment, out.rest_u_rad, first, base), second);
   if (!fixed) {
-    const Eigen::Matrix3d read = (all[0] * pose_of(configured.base_plate)).linear();
+    const Eigen::Matrix3d read = (all[0] * pose_of(configured.base_marker_frame)).linear();
     const double cosine = read.col(2).dot(experiment.arm.base_rotation.col(2));
     const double sine = read.col(2).cross(experiment.arm.base_rotation.col(2)).norm();
     out.base_tilt_rad = std::atan2(sine, cosine);
@@ -249,7 +250,7 @@ std::string calibration_text(const Experiment& experiment, const RestCalibration
 std::string calibrated_yaml(const Experiment& experiment, const RestCalibration& found,
                             const std::string& note, const std::string& config) {
   const bool named = experiment.transport.mocap.source.channel_per_body;
-  const auto plate = [&](const MarkerFrameSettings& each) {
+  const auto row = [&](const MarkerFrameSettings& each) {
     const Eigen::Vector3d &p = each.position_m, &r = each.rotation_rad;
     return fmt::format(
         "{{{}position_m: [{:.9f}, {:.9f}, {:.9f}], rotation_rad: [{:.9f}, {:.9f}, {:.9f}]}}",
@@ -258,10 +259,10 @@ std::string calibrated_yaml(const Experiment& experiment, const RestCalibration&
   };
   std::string text = fmt::format("# {}\ninclude: {}\n\ndaemon:\n  bodies:\n", note, config);
   if (found.bodies.base_id >= 0)
-    text += fmt::format("    base_plate: {}\n", plate(found.bodies.base_plate));
+    text += fmt::format("    base_plate: {}\n", row(found.bodies.base_marker_frame));
   text += "    segment_plates:\n";
-  for (const MarkerFrameSettings& each : found.bodies.segment_plates)
-    text += fmt::format("      - {}\n", plate(each));
+  for (const MarkerFrameSettings& each : found.bodies.segment_marker_frames)
+    text += fmt::format("      - {}\n", row(each));
   return text;
 }
 

@@ -22,7 +22,8 @@ constexpr double kStep = 2.0;  ///< times the fastest mode's time constant; stab
 ArmHypothesis hypothesis(const ArmParameters& arm, const ActuationSettings& actuation) {
   ArmHypothesis out;
   out.arm = arm;
-  out.rest_rad.setZero(arm.dof());
+  out.arm.extensible = false;  // what is identified is how segments bend
+  out.rest_rad.setZero(2 * arm.size());
   out.input_map.resize(2, chamber_count(actuation));
   Eigen::Index first = 0;
   for (std::size_t i = 0; i < actuation.segments.size(); ++i) {
@@ -49,7 +50,7 @@ class Motion {
 
   [[nodiscard]] bool acceleration(const Eigen::VectorXd& u, const Eigen::VectorXd& v,
                                   const Eigen::VectorXd& input, Eigen::VectorXd& a) {
-    push_force(arm_, u, input, force_);
+    actuation_force(arm_, u, input, force_);
     spring_force(arm_, u, spring_);
     force_ -= spring_;
     return forward_dynamics(plain_, workspace_, u, v, force_, a);
@@ -57,7 +58,7 @@ class Motion {
 
   /// Residual of the static balance: G + springs - input.
   void imbalance(const Eigen::VectorXd& u, const Eigen::VectorXd& input, Eigen::VectorXd& out) {
-    push_force(arm_, u, input, force_);
+    actuation_force(arm_, u, input, force_);
     spring_force(arm_, u, spring_);
     gravity_moments(plain_, workspace_, u, out);
     out += spring_ - force_;
@@ -73,7 +74,7 @@ class Motion {
   /// One step of length h; inputs at its begin, middle and end.
   [[nodiscard]] bool step(double h, const Eigen::VectorXd& p0, const Eigen::VectorXd& p1,
                           const Eigen::VectorXd& p2, Eigen::VectorXd& u, Eigen::VectorXd& v) {
-    if (!arm_.inertia) return creep(h, p0, p1, p2, u);
+    if (!arm_.inertia) return quasi_static_step(h, p0, p1, p2, u);
     if (!acceleration(u, v, p0, a1_)) return false;
     u2_ = u + 0.5 * h * v;
     v2_ = v + 0.5 * h * a1_;
@@ -90,8 +91,9 @@ class Motion {
   }
 
   /// The same without inertia.
-  [[nodiscard]] bool creep(double h, const Eigen::VectorXd& p0, const Eigen::VectorXd& p1,
-                           const Eigen::VectorXd& p2, Eigen::VectorXd& u) {
+  [[nodiscard]] bool quasi_static_step(double h, const Eigen::VectorXd& p0,
+                                       const Eigen::VectorXd& p1, const Eigen::VectorXd& p2,
+                                       Eigen::VectorXd& u) {
     velocity(u, p0, a1_);
     u2_ = u + 0.5 * h * a1_;
     velocity(u2_, p1, a2_);
@@ -141,8 +143,8 @@ ArmHypothesis of_plant(const Experiment& experiment) {
   return out;
 }
 
-void push_force(const ArmHypothesis& arm, ConstVectorRef u, const Eigen::VectorXd& input,
-                VectorRef force) {
+void actuation_force(const ArmHypothesis& arm, ConstVectorRef u, const Eigen::VectorXd& input,
+                     VectorRef force) {
   force.setZero();
   for (Eigen::Index j = 0; j < arm.input_map.cols(); ++j)
     force.segment<2>(2 * arm.segment_of[static_cast<std::size_t>(j)]) +=

@@ -25,7 +25,7 @@ Eigen::MatrixXd sum_covariance(const Eigen::MatrixXd& scores) {
     const double rho = std::clamp(lag_one(scores.col(j)), -kMostColour, kMostColour);
     white.col(j) -= rho * scores.col(j).head(rows - 1);
     colour[j] = 1.0 / (1.0 - rho);
-    // Each column weighs in units of its own spread, as parameters do.
+    // Each column weighs in units of its spread, as parameters do.
     const double left = std::clamp(lag_one(white.col(j)), -kMostColour, kMostColour);
     numerator += 4.0 * left * left / (std::pow(1.0 - left, 6) * std::pow(1.0 + left, 2));
     denominator += 1.0 / std::pow(1.0 - left, 4);

@@ -41,7 +41,7 @@ std::string report_text(std::span<const Finding> findings) {
   std::string text;
   for (const Finding& each : findings)
     text += fmt::format("{:<11}  {:<16}  {}{}{}\n", name(each.verdict), each.check, each.text,
-                        each.cure.empty() ? "" : ". Fix: ", each.cure);
+                        each.fix.empty() ? "" : ". Fix: ", each.fix);
   return text + fmt::format("{} passed, {} failed, {} not checked\n",
                             count(findings, Verdict::pass), count(findings, Verdict::fail),
                             count(findings, Verdict::not_checked));
@@ -54,7 +54,7 @@ std::string report_json(std::span<const Finding> findings) {
     list.push_back({{"check", each.check},
                     {"verdict", name(each.verdict)},
                     {"text", each.text},
-                    {"cure", each.cure}});
+                    {"cure", each.fix}});
   const Json report{{"findings", std::move(list)}, {"failed", count(findings, Verdict::fail)}};
   return report.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
 }

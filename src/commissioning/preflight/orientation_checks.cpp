@@ -32,7 +32,7 @@ Finding check_quaternions(const Experiment& experiment, const Poses& poses,
     out.verdict = Verdict::fail;
     out.text = fmt::format("{}: a quaternion of length {:.3f}, expected 1", place(i),
                            body.orientation.norm());
-    out.cure = "the sender must send unit quaternions; if it is far off, other numbers are sent";
+    out.fix = "the sender must send unit quaternions; if it is far off, other numbers are sent";
     return out;
   }
   const ReadingFit fit = fit_of(kAsConfigured, poses.rest, poses.bent);
@@ -52,7 +52,7 @@ Finding check_quaternions(const Experiment& experiment, const Poses& poses,
         "w, x, y, z and x, y, z, w are interchanged: as configured, chords and "
         "orientations disagree by {:.2f} rad, in the other order by {:.3f} rad",
         fit.at_rest_rad, other.at_rest_rad);
-    out.cure = fmt::format(
+    out.fix = fmt::format(
         "daemon.mocap.quaternion: {}",
         experiment.transport.mocap.quaternion == QuaternionOrder::wxyz ? "xyzw" : "wxyz");
   } else if (!hands_that_fit(poses).empty()) {
@@ -61,7 +61,7 @@ Finding check_quaternions(const Experiment& experiment, const Poses& poses,
     out.verdict = Verdict::fail;
     out.text = fmt::format("chords and orientations disagree by {:.2f} rad in either order",
                            fit.at_rest_rad);
-    out.cure =
+    out.fix =
         "set the bodies' axes: z of every body along the arm, away from the base, x towards "
         "the angle 0 of the chambers";
   }
@@ -88,7 +88,7 @@ Finding check_handedness(const Poses& poses, const Poses& in_other_order) {
     out.verdict = Verdict::fail;
     out.text = fmt::format("positions and orientations do not belong together; {} would",
                            fmt::join(hands, " or "));
-    out.cure =
+    out.fix =
         "make the sender's world right-handed, positions and orientations alike, from body "
         "to world";
   } else {
@@ -130,7 +130,7 @@ Finding check_rest_pose(const Experiment& experiment, const MeanPoses& rest) {
   if (!wrong.empty()) {
     out.verdict = Verdict::fail;
     out.text = fmt::format("{}", fmt::join(wrong, "; "));
-    out.cure = "softarm calibrate, with the arm at rest (daemon.bodies.base_plate, segment_plates)";
+    out.fix = "softarm calibrate, with the arm at rest (daemon.bodies.base_plate, segment_plates)";
   }
   return out;
 }

@@ -123,7 +123,7 @@ Finding check_still(const Experiment& experiment, const Observation& seen, const
   out.text = fmt::format("the end moves by {:.2g} % of the arm's length rms", 100.0 * part);
   out.verdict = part <= kStill ? Verdict::pass : Verdict::fail;
   if (out.verdict == Verdict::fail)
-    out.cure =
+    out.fix =
         "wait until the arm hangs still, softarm disarm if a daemon moves it; or the camera "
         "confuses "
         "two bodies: make their markers differ";
@@ -149,13 +149,13 @@ Finding check_units(const Experiment& experiment, const MeanPoses& rest) {
   }
   out.verdict = Verdict::fail;
   const bool configured_mm = experiment.transport.mocap.unit == LengthUnit::millimetre;
-  out.cure = fmt::format(
+  out.fix = fmt::format(
       "the sender's unit of length (daemon.mocap.unit is {}), and arm.length_m in metres",
       configured_mm ? "mm" : "m");
   for (const Unit& unit : kFactors)
     if (std::abs(ratio / unit.factor - 1.0) < kUnitSlack) {
-      if (unit.factor == 1e3 && !configured_mm) out.cure = "daemon.mocap.unit: mm";
-      if (unit.factor == 1e-3 && configured_mm) out.cure = "daemon.mocap.unit: m";
+      if (unit.factor == 1e3 && !configured_mm) out.fix = "daemon.mocap.unit: mm";
+      if (unit.factor == 1e-3 && configured_mm) out.fix = "daemon.mocap.unit: m";
       out.text += unit.factor > 1.0
                       ? fmt::format(": positions come in {}", unit.name)
                       : fmt::format(": positions are {:g} times too small, divided twice",
@@ -196,11 +196,11 @@ Finding check_order(const Experiment& experiment, const MeanPoses& rest) {
   };
   std::vector<int> ids;
   for (const std::size_t body : line.order) ids.push_back(id(body));
-  out.cure = "exchange them in daemon.bodies or in the motion capture";
+  out.fix = "exchange them in daemon.bodies or in the motion capture";
   if (ids.size() == rest.body.size() && bodies.base_id >= 0 &&
       !experiment.transport.mocap.source.channel_per_body)
-    out.cure = fmt::format("daemon.bodies: {{base_id: {}, segment_ids: [{}]}}", ids.front(),
-                           fmt::join(ids.begin() + 1, ids.end(), ", "));
+    out.fix = fmt::format("daemon.bodies: {{base_id: {}, segment_ids: [{}]}}", ids.front(),
+                          fmt::join(ids.begin() + 1, ids.end(), ", "));
   return out;
 }
 
@@ -226,7 +226,7 @@ Finding check_world_axes(const Experiment& experiment, const MeanPoses& rest) {
   out.verdict = Verdict::fail;
   out.text += fmt::format(", by arm.base it should be {}, {:.2f} rad away", nearest_axis(expected),
                           off_rad);
-  out.cure =
+  out.fix =
       "daemon.mocap.axes (many systems have y up: y_up), or arm.base.rotation; or base and tip are "
       "exchanged in daemon.bodies";
   return out;
@@ -258,7 +258,7 @@ Finding check_lengths(const Experiment& experiment, const MeanPoses& rest, bool 
   if (!wrong.empty()) {
     out.verdict = Verdict::fail;
     out.text = fmt::format("{}", fmt::join(wrong, "; "));
-    out.cure =
+    out.fix =
         fmt::format("measure from body to body: arm.length_m: [{:.4g}]", fmt::join(all_m, ", "));
   }
   return out;

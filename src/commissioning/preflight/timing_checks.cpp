@@ -25,9 +25,10 @@ std::string body_name(std::size_t index, const TransportSettings& transport) {
   const BodySettings& bodies = transport.bodies;
   const std::string what = index == 0 ? "base" : fmt::format("end of segment {}", index);
   if (transport.mocap.source.channel_per_body)
-    return fmt::format("{} (channel {})", what,
-                       body_channel(transport.lcm, index == 0 ? bodies.base_plate
-                                                              : bodies.segment_plates[index - 1]));
+    return fmt::format(
+        "{} (channel {})", what,
+        body_channel(transport.lcm, index == 0 ? bodies.base_marker_frame
+                                               : bodies.segment_marker_frames[index - 1]));
   return fmt::format("{} (id {})", what,
                      index == 0 ? bodies.base_id : bodies.segment_ids[index - 1]);
 }
@@ -44,7 +45,7 @@ Finding check_bodies(const Experiment& experiment, const Observation& seen) {
     out.text = fmt::format("no frame on {} within {:.1f} s", channels, listened_s);
     if (seen.not_frames > 0)
       out.text += fmt::format(", but {} packets that are not frames", seen.not_frames);
-    out.cure = fmt::format(
+    out.fix = fmt::format(
         "start the sender of frames, or fix daemon.mocap.source; it must publish on {} at {}",
         channels, lcm.url);
     return out;
@@ -67,10 +68,10 @@ Finding check_bodies(const Experiment& experiment, const Observation& seen) {
   }
   out.verdict = Verdict::fail;
   out.text += fmt::format(": {}", fmt::join(missing, ", "));
-  out.cure = seen.other_ids.empty()
-                 ? "markers hidden, too few or not tracked"
-                 : fmt::format("daemon.bodies does not name ids {}, which are there",
-                               id_list(seen.other_ids));
+  out.fix = seen.other_ids.empty()
+                ? "markers hidden, too few or not tracked"
+                : fmt::format("daemon.bodies does not name ids {}, which are there",
+                              id_list(seen.other_ids));
   return out;
 }
 
@@ -116,10 +117,10 @@ Finding check_rate(const Experiment& experiment, const Times& times) {
                          100.0 * missing);
   if (std::abs(period_s / configured_s - 1.0) > kRateTolerance) {
     out.verdict = Verdict::fail;
-    out.cure = fmt::format("daemon.safety.frame_period_s: {:.4g}, or the camera's rate", period_s);
+    out.fix = fmt::format("daemon.safety.frame_period_s: {:.4g}, or the camera's rate", period_s);
   } else if (missing > kMissingTolerance) {
     out.verdict = Verdict::fail;
-    out.cure =
+    out.fix =
         "a separate wired network between camera host and this machine; a receive buffer "
         "that holds the frames";
   } else {
@@ -151,7 +152,7 @@ Finding check_jitter(const Experiment& experiment, const Times& times) {
   out.verdict = late > 0 ? Verdict::fail : Verdict::pass;
   if (late > 0) {
     out.text += fmt::format(", which would have occurred {} times", late);
-    out.cure =
+    out.fix =
         "reduce the load on the network and this machine, or raise daemon.safety.hold_after_s";
   }
   return out;
@@ -183,7 +184,7 @@ Finding check_latency(const Experiment& experiment, const Observation& seen, con
     }
     out.verdict = Verdict::fail;
     out.text = "the sender's time stamps do not advance";
-    out.cure = "stamp every frame at exposure, or daemon.capture_time: latency";
+    out.fix = "stamp every frame at exposure, or daemon.capture_time: latency";
     return out;
   }
   std::string clock;
@@ -201,7 +202,7 @@ Finding check_latency(const Experiment& experiment, const Observation& seen, con
   out.verdict = Verdict::pass;
   if (std::abs(*least_s - declared_s) > std::max(kLatencyTolerance_s, 0.25 * declared_s)) {
     out.verdict = Verdict::fail;
-    out.cure = fmt::format(
+    out.fix = fmt::format(
         "daemon.safety.frame_latency_s: {:.4f}, unless stamps are not taken at "
         "exposure",
         std::max(0.0, *least_s));

@@ -48,7 +48,7 @@ Finding check_pressures(const Experiment& experiment, const Observation& seen) {
     out.text = fmt::format("no measured pressures on {}", lcm.measurement_channel);
     if (experiment.safety.valve_readback) {
       out.verdict = Verdict::fail;
-      out.cure =
+      out.fix =
           "start softarm-valves; the daemon goes to FAULT without them "
           "(daemon.safety.valve_readback)";
     }
@@ -63,7 +63,7 @@ Finding check_pressures(const Experiment& experiment, const Observation& seen) {
     out.verdict = Verdict::fail;
     out.text = fmt::format("{} pressures are measured, {} chambers configured", wrong->bar.size(),
                            chambers);
-    out.cure = "actuation.chambers of this arm, and the configuration softarm-valves was given";
+    out.fix = "actuation.chambers of this arm, and the configuration softarm-valves was given";
     return out;
   }
   // Pressure from before must vent first.
@@ -82,7 +82,7 @@ Finding check_pressures(const Experiment& experiment, const Observation& seen) {
   if (out.verdict == Verdict::fail) {
     out.text = fmt::format("{} shows {:.3f} bar, expected 0 bar: nothing is commanded",
                            valve_name(experiment, valve), *most);
-    out.cure = "a valve that does not close, or a sensor's zero";
+    out.fix = "a valve that does not close, or a sensor's zero";
   }
   return out;
 }
@@ -140,7 +140,7 @@ Finding check_leaks(const Experiment& experiment, const Observation& seen) {
                                looked_at, chambers, 100.0 * kShort)
                  : fmt::format("{}", fmt::join(problems, "; "));
   if (!problems.empty())
-    out.cure =
+    out.fix =
         "look for a leak, a burst or pinched tube, a weak supply; or sensors on other tubes "
         "than their valves";
   return out;

@@ -34,12 +34,12 @@ int acts_like(const Experiment& experiment, const PulseResponse& response) {
 using Responses = std::vector<PulseResponse>;
 
 /// The single mistake that explains all chambers; empty if there is none.
-std::string common_cause(const Responses& responses, std::string& cure) {
+std::string common_cause(const Responses& responses, std::string& fix) {
   const auto all = [&](auto&& holds) {
     return std::all_of(responses.begin(), responses.end(), holds);
   };
   if (all([](const PulseResponse& each) { return each.silent(); })) {
-    cure = "open the air supply; is the valve driver running, and not DEGRADED?";
+    fix = "open the air supply; is the valve driver running, and not DEGRADED?";
     return "no chamber moves the arm";
   }
   if (!all([](const PulseResponse& each) { return !each.silent() && !each.astray(); })) return "";
@@ -48,8 +48,8 @@ std::string common_cause(const Responses& responses, std::string& cure) {
         return std::abs(wrapped(each.turned_rad() - turned_rad)) < kDirection_rad;
       })) {
     const bool half = std::abs(std::abs(turned_rad) - kPi) < kDirection_rad;
-    cure = fmt::format("{}actuation.chambers.angle_rad, or turn the bodies' x axes",
-                       half ? "the arm bends away from a chamber at angle_rad: add pi to " : "");
+    fix = fmt::format("{}actuation.chambers.angle_rad, or turn the bodies' x axes",
+                      half ? "the arm bends away from a chamber at angle_rad: add pi to " : "");
     return fmt::format("all chambers are turned by {:.2f} rad about the arm", turned_rad);
   }
   const double sum_rad = responses.front().measured_rad + responses.front().configured_rad;
@@ -57,7 +57,7 @@ std::string common_cause(const Responses& responses, std::string& cure) {
         return std::abs(wrapped(each.measured_rad + each.configured_rad - sum_rad)) <
                kDirection_rad;
       })) {
-    cure =
+    fix =
         "make the world of the motion capture right-handed; or, if it is, count the chambers the "
         "other way round in actuation.chambers.angle_rad";
     return "every segment bends as in a mirror";
@@ -86,22 +86,22 @@ std::string one_problem(const Experiment& experiment, const PulseResponse& respo
 
 /// The valves.order with which every chamber acts as configured; empty if that is not a
 /// permutation.
-std::vector<int> mended_order(const Experiment& experiment, const Responses& responses) {
+std::vector<int> corrected_order(const Experiment& experiment, const Responses& responses) {
   std::vector<int> first(1, 0);
   for (const auto& chambers : experiment.actuation.segments)
     first.push_back(first.back() + static_cast<int>(chambers.size()));
   const std::vector<int>& order = experiment.valves.order;
-  std::vector<int> mended(static_cast<std::size_t>(first.back()), -1);
-  if (responses.size() != mended.size() || order.size() != mended.size()) return {};
+  std::vector<int> corrected(static_cast<std::size_t>(first.back()), -1);
+  if (responses.size() != corrected.size() || order.size() != corrected.size()) return {};
   for (const PulseResponse& each : responses) {
     const int like = each.silent() ? -1 : acts_like(experiment, each);
     if (like < 0) return {};
     int& slot =
-        mended[static_cast<std::size_t>(first[static_cast<std::size_t>(each.segment)] + like)];
+        corrected[static_cast<std::size_t>(first[static_cast<std::size_t>(each.segment)] + like)];
     if (slot >= 0) return {};
     slot = order[static_cast<std::size_t>(each.pulse.valve)];
   }
-  return mended;
+  return corrected;
 }
 
 std::string strength_text(const Responses& responses) {
@@ -165,7 +165,7 @@ Finding check_valve_map(const Experiment& experiment, const Observation& seen) {
     }
     responses.push_back(*response);
   }
-  if (const std::string cause = problems.empty() ? common_cause(responses, out.cure) : "";
+  if (const std::string cause = problems.empty() ? common_cause(responses, out.fix) : "";
       !cause.empty()) {
     out.verdict = Verdict::fail;
     out.text = cause;
@@ -184,11 +184,11 @@ Finding check_valve_map(const Experiment& experiment, const Observation& seen) {
   }
   out.verdict = Verdict::fail;
   out.text = fmt::format("{}", fmt::join(problems, "; "));
-  const std::vector<int> order = mended_order(experiment, responses);
-  out.cure = order.empty() || order == experiment.valves.order
-                 ? "tubes, valves.order and actuation.chambers (angle_rad, gain_nm_per_bar)"
-                 : fmt::format("exchange the tubes, or valves.order: [{}] for softarm-valves",
-                               fmt::join(order, ", "));
+  const std::vector<int> order = corrected_order(experiment, responses);
+  out.fix = order.empty() || order == experiment.valves.order
+                ? "tubes, valves.order and actuation.chambers (angle_rad, gain_nm_per_bar)"
+                : fmt::format("exchange the tubes, or valves.order: [{}] for softarm-valves",
+                              fmt::join(order, ", "));
   return out;
 }
 

@@ -1,4 +1,4 @@
-// The fault injector makes the faults it names: judged by what the frame validator says of them.
+// The fault injector makes the faults it names: judged by the verdicts of the frame validator.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -124,7 +124,7 @@ TEST_F(Injector, DelaysInOrderAndFreezesThePoses) {
   EXPECT_EQ(message.bodies[3].position_m[0], before);
 }
 
-TEST_F(Injector, NumbersBeginAnewAlsoAfterTheSenderItselfDid) {
+TEST_F(Injector, NumbersBeginAgainAlsoAfterTheSenderItselfDid) {
   FaultInjector injector;
   softarm_messages::mocap_frame_t message;
   const auto number_of = [&](std::int64_t number) {
@@ -142,7 +142,7 @@ TEST_F(Injector, NumbersBeginAnewAlsoAfterTheSenderItselfDid) {
   EXPECT_EQ(number_of(301), 1) << "numbers go back, not on from below zero";
 }
 
-TEST_F(Injector, SpoilsPressures) {
+TEST_F(Injector, CorruptsPressures) {
   FaultInjector injector;
   softarm_messages::pressure_measurement_t measured{};
   measured.pressure_bar = {1.0F, 2.0F, 3.0F};
@@ -177,7 +177,7 @@ TEST_F(Injector, MirrorsPositionsAlone) {
   }
 }
 
-TEST(Faults, HaveNamesOfTheirOwn) {
+TEST(Faults, HaveDistinctNames) {
   for (const FaultDescription& each : fault_list()) {
     ASSERT_TRUE(find_fault(each.name));
     EXPECT_EQ(find_fault(each.name)->kind, each.kind) << each.name;

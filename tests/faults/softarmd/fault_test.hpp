@@ -49,15 +49,14 @@ class FaultTest : public ::testing::TestWithParam<Machine>, protected Station {
 
   static bool loaded() { return GetParam() == Machine::loaded; }
 
-  /// Thresholds that a busy machine does not reach by itself, and less waiting for good frames.
-  /// `more` is further YAML under `daemon:`, `safety` further keys of daemon.safety.
+  /// Patient thresholds. `more` is further YAML under `daemon:`, `safety` further keys of
+  /// daemon.safety.
   void configure(Station& station, const std::string& safety = "", const std::string& more = "",
                  const std::string& rest = "") const {
-    station.write_config(
-        "paper_arm.yaml",
-        "  safety: {hold_after_s: 0.1, vent_after_s: 0.25, good_frames: 20, frozen_frames: 40" +
-            safety + "}\n" + realtime() + more,
-        rest);
+    station.write_config("paper_arm.yaml",
+                         std::string("  safety: {") + kPatientSafety + ", frozen_frames: 40" +
+                             safety + "}\n" + realtime() + more,
+                         rest);
   }
   static std::string realtime() {
     return loaded()

@@ -16,6 +16,7 @@ class FrameFaults : public FaultTest {
     relay_ = start_relay(*this);
     plant_process_ = start_plant(*this, kSensorSuffix);
     daemon_ = start("softarmd");
+    arm_when_asked();
     ASSERT_TRUE(wait_for([&] { return under_pressure(); }))
         << daemon_->printed() << plant_process_->printed();
   }
@@ -30,7 +31,7 @@ class FrameFaults : public FaultTest {
   /// All is well again, and the daemon ACTIVE.
   void recovers() {
     relay_->set({});
-    EXPECT_TRUE(stays_active(*this, 10)) << told() << daemon_->printed();
+    EXPECT_TRUE(stays_active(*this, 10)) << seen_text() << daemon_->printed();
   }
 
   std::unique_ptr<FaultRelay> relay_;
@@ -51,13 +52,17 @@ TEST_P(FrameFaults, WithoutGoodFramesTheDaemonHoldsThenVents) {
     SCOPED_TRACE(row.fault);
     const std::int64_t rejected = status_.frames_rejected;
     inject(row.fault, row.amount);
-    EXPECT_TRUE(becomes(*this, Mode::vent, Reason::frames_stale)) << told() << daemon_->printed();
-    EXPECT_TRUE(saw(Mode::hold, Reason::frames_late)) << told();
-    EXPECT_TRUE(wait_for([&] { return largest(command_.pressure_bar) == 0.0F; })) << told();
+    EXPECT_TRUE(becomes(*this, Mode::vent, Reason::frames_stale))
+        << seen_text() << daemon_->printed();
+    EXPECT_TRUE(saw(Mode::hold, Reason::frames_late)) << seen_text();
+    EXPECT_TRUE(wait_for([&] { return largest(command_.pressure_bar) == 0.0F; })) << seen_text();
     if (row.rejected) {
       EXPECT_TRUE(wait_for([&] { return status_.frames_rejected > rejected + 5; }));
     } else {
-      EXPECT_EQ(status_.frames_rejected, rejected);
+      const std::int64_t before = status_.frames_rejected;
+      const int statuses = statuses_;
+      EXPECT_TRUE(wait_for([&] { return statuses_ > statuses + 50; }));  // 20 frames
+      EXPECT_LT(status_.frames_rejected, before + 5);
     }
     recovers();
   }
@@ -79,69 +84,70 @@ TEST_P(FrameFaults, WhatIsDroppedOrCompensatedDisturbsNothing) {
     bool undisturbed = false;
     for (int k = 0; k < 5 && !undisturbed; ++k) {
       inject(row.fault, row.amount);
-      EXPECT_TRUE(wait_for([&] { return status_.*row.counter > before + 10; })) << told();
+      EXPECT_TRUE(wait_for([&] { return status_.*row.counter > before + 10; })) << seen_text();
       active_in_row_ = 0;
       undisturbed = wait_for([&] { return active_in_row_ >= 100; }, 1.0);
       recovers();
     }
-    EXPECT_TRUE(undisturbed) << told() << daemon_->printed();
+    EXPECT_TRUE(undisturbed) << seen_text() << daemon_->printed();
   }
 
   // Late frames, within the bound: the age is known, u is predicted over it.
   const double age_s = status_.frame_age_s;
   inject("delay", 0.03);
-  EXPECT_TRUE(wait_for([&] { return status_.frame_age_s > age_s + 0.02; })) << told();
-  EXPECT_TRUE(stays_active(*this)) << told() << daemon_->printed();
+  EXPECT_TRUE(wait_for([&] { return status_.frame_age_s > age_s + 0.02; })) << seen_text();
+  EXPECT_TRUE(stays_active(*this)) << seen_text() << daemon_->printed();
   recovers();
 
   // The sender's clock is set forward, and with the end of the fault back.
   inject("clock", 3600.0);
   const std::int64_t accepted = status_.frames_accepted;
-  EXPECT_TRUE(stays_active(*this)) << told() << daemon_->printed();
+  EXPECT_TRUE(stays_active(*this)) << seen_text() << daemon_->printed();
   EXPECT_TRUE(wait_for([&] { return status_.frames_accepted > accepted + 40; }));
   recovers();
-  EXPECT_TRUE(stays_active(*this)) << told() << daemon_->printed();
+  EXPECT_TRUE(stays_active(*this)) << seen_text() << daemon_->printed();
   expect_limits(*this);
 }
 
 TEST_P(FrameFaults, FrozenPosesHoldAndARestartedSenderVents) {
   inject("freeze");
-  EXPECT_TRUE(becomes(*this, Mode::hold, Reason::poses_frozen)) << told() << daemon_->printed();
+  EXPECT_TRUE(becomes(*this, Mode::hold, Reason::poses_frozen))
+      << seen_text() << daemon_->printed();
   const PressureVector held = command_.pressure_bar;
   const int commands = commands_;
   ASSERT_TRUE(wait_for([&] { return commands_ > commands + 50; }));
   EXPECT_EQ(command_.pressure_bar, held);
-  EXPECT_EQ(mode(), Mode::hold) << told();
+  EXPECT_EQ(mode(), Mode::hold) << seen_text();
   recovers();
 
   inject("restart");
-  EXPECT_TRUE(wait_for([&] { return saw(Mode::vent, Reason::sender_restarted); })) << told();
+  EXPECT_TRUE(wait_for([&] { return saw(Mode::vent, Reason::sender_restarted); })) << seen_text();
   recovers();
 
   // The same by a real restart, after a silence.
   forget();
   plant_process_.reset();
-  EXPECT_TRUE(becomes(*this, Mode::vent, Reason::frames_stale)) << told();
+  EXPECT_TRUE(becomes(*this, Mode::vent, Reason::frames_stale)) << seen_text();
   plant_process_ = start_plant(*this, kSensorSuffix);
   recovers();
   expect_limits(*this);
 }
 
-TEST_P(FrameFaults, WithExplicitArmingARestartedSenderMustBeArmedAnew) {
-  daemon_->signal(SIGTERM);
-  ASSERT_EQ(daemon_->wait(std::chrono::seconds(5)), 0);
+TEST_P(FrameFaults, WithExplicitArmingARestartedSenderMustBeArmedAgain) {
+  ASSERT_EQ(end(*daemon_), 0);
   configure(*this, ", arming: explicit");
+  meanwhile_ = {};
   statuses_ = 0;
   daemon_ = start("softarmd");
   ASSERT_TRUE(becomes(*this, Mode::wait_frames, Reason::waiting_for_arm)) << daemon_->printed();
   client_->send(OperatorRequest::arm);
-  ASSERT_TRUE(wait_for([&] { return under_pressure(); })) << told();
+  ASSERT_TRUE(wait_for([&] { return under_pressure(); })) << seen_text();
   inject("restart");
-  EXPECT_TRUE(becomes(*this, Mode::vent, Reason::waiting_for_arm)) << told();
-  EXPECT_TRUE(saw(Mode::vent, Reason::sender_restarted)) << told();
+  EXPECT_TRUE(becomes(*this, Mode::vent, Reason::waiting_for_arm)) << seen_text();
+  EXPECT_TRUE(saw(Mode::vent, Reason::sender_restarted)) << seen_text();
   EXPECT_EQ(largest(command_.pressure_bar), 0.0F);
   client_->send(OperatorRequest::arm);
-  EXPECT_TRUE(wait_for([&] { return mode() == Mode::active; })) << told();
+  EXPECT_TRUE(wait_for([&] { return mode() == Mode::active; })) << seen_text();
 }
 
 SOFTARM_ON_BOTH_MACHINES(FrameFaults);

@@ -13,7 +13,6 @@
 namespace softarm {
 namespace {
 
-using namespace std::chrono_literals;
 using test::FaultTest;
 using test::Station;
 
@@ -32,8 +31,8 @@ TEST_P(MessagesAndLimits, HostileBytesAndAFloodAreCountedAndHarmless) {
   const auto plant = start_plant(*this);
   const auto daemon = start("softarmd");
   const auto deadman = start("softarm", {"deadman"});
-
-  ASSERT_TRUE(wait_for([&] { return under_pressure(); })) << told() << daemon->printed();
+  arm_when_asked();
+  ASSERT_TRUE(wait_for([&] { return under_pressure(); })) << seen_text() << daemon->printed();
 
   const LcmSettings lcm = load_experiment(config_.string()).transport.lcm;
   const std::vector<Packet> hostile = hostile_packets(lcm);
@@ -42,13 +41,14 @@ TEST_P(MessagesAndLimits, HostileBytesAndAFloodAreCountedAndHarmless) {
   const std::int64_t start_ns = monotonic_now_ns();
   for (int round = 0; round < 20; ++round) {
     for (const Packet& packet : hostile) sender.send(packet);
-    wait_for([] { return false; }, 0.02);  // slowly enough for the real frames to come through
+    go_on(0.02);  // slowly enough for the real frames to come through
   }
-  EXPECT_TRUE(wait_for([&] { return status_.messages_malformed > before + 200; })) << told();
-  EXPECT_TRUE(stays_active(*this)) << told() << daemon->printed();
+  EXPECT_TRUE(wait_for([&] { return status_.messages_malformed > before + 200; })) << seen_text();
+  EXPECT_TRUE(stays_active(*this)) << seen_text() << daemon->printed();
   const double passed_s = to_seconds(monotonic_now_ns() - start_ns);
   EXPECT_TRUE(wait_for([&] { return count(daemon->printed(), "malformed") > 0; }));
-  EXPECT_LE(count(daemon->printed(), "malformed"), 2.0 + passed_s) << "told once a second at most";
+  EXPECT_LE(count(daemon->printed(), "malformed"), 2.0 + passed_s)
+      << "reported at most once a second";
 
   // As fast as it goes: the daemon keeps ticking, and is back when it is over. What it needs to
   // hear may be lost meanwhile, so it may ask for an operator.
@@ -61,19 +61,13 @@ TEST_P(MessagesAndLimits, HostileBytesAndAFloodAreCountedAndHarmless) {
   const std::int64_t tick = status_.tick;
   const int commands = commands_;
   EXPECT_TRUE(wait_for([&] { return status_.tick > tick + 500 && commands_ > commands; }))
-      << told();
+      << seen_text();
   stop = true;
   flood.join();
-  EXPECT_TRUE(wait_for([&, asked = 0]() mutable {
-    if (mode() != Mode::active && ++asked % 10 == 0)
-      client_->send(mode() == Mode::fault ? OperatorRequest::disarm : OperatorRequest::arm);
-    return under_pressure();
-  })) << told()
-      << daemon->printed();
-  EXPECT_TRUE(stays_active(*this)) << told() << daemon->printed();
+  EXPECT_TRUE(wait_for([&] { return under_pressure(); })) << seen_text() << daemon->printed();
+  EXPECT_TRUE(stays_active(*this)) << seen_text() << daemon->printed();
   expect_limits(*this);
-  daemon->signal(SIGTERM);
-  EXPECT_EQ(daemon->wait(1000ms), 0) << daemon->printed();
+  EXPECT_EQ(end(*daemon), 0) << daemon->printed();
 }
 
 TEST_P(MessagesAndLimits, ReferencesOutOfReachAndThroughTheStraightPoseStayBounded) {
@@ -102,18 +96,19 @@ TEST_P(MessagesAndLimits, ReferencesOutOfReachAndThroughTheStraightPoseStayBound
     Station& station = *stations[k];
     configure(station, "", "", settings[k]);
     if (k > 0) station.listen();
+    if (k < 2) station.arm_when_asked();
     processes.push_back(start_plant(station));
     processes.push_back(station.start("softarmd"));
   }
-  EXPECT_TRUE(wait_for([&] { return saw_bounded_; })) << told() << processes[1]->printed();
+  EXPECT_TRUE(wait_for([&] { return saw_bounded_; })) << seen_text() << processes[1]->printed();
   EXPECT_TRUE(unreachable.wait_for([&] {
     return unreachable.saw_saturated_ && unreachable.saw_slew_limited_;
-  })) << unreachable.told()
+  })) << unreachable.seen_text()
       << processes[3]->printed();
-  EXPECT_TRUE(stays_active(unreachable)) << unreachable.told() << processes[3]->printed();
+  EXPECT_TRUE(stays_active(unreachable)) << unreachable.seen_text() << processes[3]->printed();
   EXPECT_TRUE(beyond.wait_for([&] { return beyond.saw(Mode::vent, Reason::soft_limit); }))
-      << beyond.told() << processes[5]->printed();
-  EXPECT_TRUE(becomes(beyond, Mode::vent, Reason::waiting_for_arm)) << beyond.told();
+      << beyond.seen_text() << processes[5]->printed();
+  EXPECT_TRUE(becomes(beyond, Mode::vent, Reason::waiting_for_arm)) << beyond.seen_text();
   for (const Station* station : stations) expect_limits(*station);
 }
 
@@ -128,13 +123,8 @@ TEST_P(MessagesAndLimits, TheSingularPoseOfTheCouplesStaysBounded) {
             "      - {time_s: 4, theta_rad: 0}\n");
   const auto plant = start_plant(*this);
   const auto daemon = start("softarmd");
-  const auto bounded = [&, asked = 0]() mutable {
-    // A busy machine may drive the arm beyond its soft limit first.
-    if (reason() == Reason::waiting_for_arm && ++asked % 10 == 0)
-      client_->send(OperatorRequest::arm);
-    return saw_bounded_;
-  };
-  EXPECT_TRUE(wait_for(bounded, 30.0)) << told() << daemon->printed();
+  arm_when_asked();
+  EXPECT_TRUE(wait_for([&] { return saw_bounded_; })) << seen_text() << daemon->printed();
   const int commands = commands_;
   EXPECT_TRUE(wait_for([&] { return commands_ > commands + 200; })) << daemon->printed();
   expect_limits(*this);

@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "fuzz/target.hpp"
+#include "test_folder.hpp"
 
 namespace softarm::test {
 namespace {
@@ -20,11 +21,8 @@ std::vector<Bytes> committed(const std::string& target) {
   std::vector<Bytes> inputs;
   const fs::path folder = fs::path(SOFTARM_SOURCE_DIR) / "tests/fuzz/corpus" / target;
   if (!fs::exists(folder)) return inputs;
-  for (const auto& entry : fs::directory_iterator(folder)) {
-    std::ostringstream text;
-    text << std::ifstream(entry.path(), std::ios::binary).rdbuf();
-    inputs.push_back(to_bytes(text.str()));
-  }
+  for (const auto& entry : fs::directory_iterator(folder))
+    inputs.push_back(to_bytes(file_text(entry.path())));
   return inputs;
 }
 

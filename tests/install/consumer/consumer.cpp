@@ -1,4 +1,4 @@
-// Another project's program: the model of an arm and a controller's room, through the installed
+// Another project's program: the model of an arm and the control module, through the installed
 // headers and libraries only.
 #include <cmath>
 #include <cstdio>

@@ -1,4 +1,4 @@
-// Calls into every room, so that whatever the installed libraries need must have been found. Its
+// Calls into every module, so that whatever the installed libraries need must have been found. Its
 // argument is an installed experiment.
 #include <cstdio>
 #include <softarm/actuation/pressure_allocator.hpp>

@@ -1,5 +1,5 @@
-// softarm-dev bench loop runs, measures daemon and rivals, and says so in JSON. How fast they are
-// is for people to look at.
+// softarm-dev bench loop runs, measures daemon and rivals, and reports them in JSON. How fast they
+// are is not tested.
 #include <gtest/gtest.h>
 #include <yaml-cpp/yaml.h>
 

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "program_output.hpp"
+#include "test_folder.hpp"
 
 namespace softarm::test {
 
@@ -41,26 +42,18 @@ std::vector<Event<Message>> read_log(const std::string& file, const std::string&
   return events;
 }
 
-/// A folder of its own, gone afterwards.
+/// A separate folder, removed afterwards.
 class ImportTest : public testing::Test {
  protected:
-  ImportTest() {
-    std::string pattern =
-        (std::filesystem::temp_directory_path() / "softarm_import_XXXXXX").string();
-    folder = mkdtemp(pattern.data());
-  }
-  ~ImportTest() override { std::filesystem::remove_all(folder); }
-
   std::string path(const std::string& name) const { return (folder / name).string(); }
   std::string write(const std::string& name, const std::string& text) const {
-    std::ofstream(path(name)) << text;
-    return path(name);
+    return folder.write(name, text).string();
   }
   Outcome import(const std::string& csv, const std::string& map) const {
     return run("import '" + csv + "' '" + map + "' --out '" + path("log") + "'");
   }
 
-  std::filesystem::path folder;
+  TestFolder folder;
 };
 
 }  // namespace softarm::test

@@ -90,7 +90,7 @@ class Recorded : public softarm::test::ImportTest, public testing::WithParamInte
     frames = read_log<mocap_frame_t>(path("log"), "SOFTARM_MOCAP");
   }
 
-  /// u of every accepted frame, by the room that the daemon uses.
+  /// u of every accepted frame, by the module that the daemon uses.
   struct Sample {
     double t;
     Eigen::Vector2d u;
@@ -173,7 +173,7 @@ TEST_P(Recorded, BodiesMoveAsInTheTable) {
       const double turned = angle(text.orientation(start, body), text.orientation(k, body));
       EXPECT_NEAR(angle(Eigen::Vector4d(from.orientation), Eigen::Vector4d(to.orientation)), turned,
                   2e-6);
-      // y up became z up: (x, y, z) -> (x, -z, y). The frames sit up to 0.1 m from the plates'
+      // y up became z up: (x, y, z) -> (x, -z, y). The frames sit up to 0.1 m from the bodies'
       // markers.
       const Eigen::Vector3d raw = text.position(k, body) - text.position(start, body);
       const Eigen::Vector3d moved =
@@ -183,7 +183,7 @@ TEST_P(Recorded, BodiesMoveAsInTheTable) {
   }
 }
 
-TEST_P(Recorded, TheArmHangsStraightBelowTheTopPlateAtRest) {
+TEST_P(Recorded, TheArmHangsStraightBelowTheTopBodyAtRest) {
   const Text text(csv);
   for (std::size_t k = 0; k < text.rows() && text.number(k, "time") < 0.5; ++k) {
     if (!frames[k].message.bodies[0].valid) continue;

@@ -1,4 +1,4 @@
-// `softarm import` on small tables whose log can be told by hand.
+// `softarm import` on small tables whose log can be computed by hand.
 #include <cmath>
 
 #include "import_fixture.hpp"
@@ -93,7 +93,7 @@ TEST_F(Import, TurnsColumnsIntoPressures) {
     EXPECT_TRUE(each.message.shadow) << "played back it moves no valve";
 }
 
-// With a window of rest the arm hangs straight there, however the plates are turned.
+// With a window of rest the arm hangs straight there, however the marker frames are turned.
 TEST_F(Import, TheRestPoseReadsStraight) {
   const std::string turned =
       replaced(kTable, "100;200;100;1;0;0;0;0.5", "120;190;105;0.5;0.5;-0.5;0.5;0.5");
@@ -133,7 +133,7 @@ TEST_F(Import, BringsTheUpAxisToZ) {
   }
 }
 
-TEST_F(Import, TellsWhatIsWrongWithTheMap) {
+TEST_F(Import, ReportsWhatIsWrongWithTheMap) {
   struct Case {
     const char *from, *to, *complaint;
   };
@@ -163,7 +163,7 @@ TEST_F(Import, TellsWhatIsWrongWithTheMap) {
   }
 }
 
-TEST_F(Import, TellsWhatIsWrongWithTheTable) {
+TEST_F(Import, ReportsWhatIsWrongWithTheTable) {
   struct Case {
     const char *from, *to, *complaint;
   };

@@ -24,7 +24,7 @@ TEST_P(MocapSender, MakesTheDaemonActive) {
   ASSERT_TRUE(wait_for([&] { return mode() == Mode::wait_frames; })) << daemon->printed();
   const auto sender = start("example_mocap_sender");
   ASSERT_TRUE(wait_for([&] { return mode() == Mode::active; }))
-      << daemon->printed() << sender->printed() << told();
+      << daemon->printed() << sender->printed() << seen_text();
   EXPECT_GT(status_.frames_accepted, 0);
   EXPECT_EQ(status_.messages_malformed, 0);
 }

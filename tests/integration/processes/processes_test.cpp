@@ -1,5 +1,5 @@
-// softarmd and softarm-plant as processes of their own, talking LCM over UDP multicast on a port of
-// the test's own. What happens when something goes wrong is in tests/faults.
+// softarmd and softarm-plant as separate processes, connected by LCM over UDP multicast on a port
+// of the test. What happens when something goes wrong is in tests/faults.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -12,7 +12,6 @@
 namespace softarm {
 namespace {
 
-using namespace std::chrono_literals;
 class Processes : public ::testing::Test, protected test::Station {
  protected:
   void SetUp() override {
@@ -21,6 +20,7 @@ class Processes : public ::testing::Test, protected test::Station {
     } catch (const TransportError& error) {
       GTEST_SKIP() << error.what();
     }
+    arm_when_asked();
   }
 };
 
@@ -37,8 +37,7 @@ TEST_F(Processes, CloseTheLoop) {
            std::abs(plant_.u_rad.segment<2>(4).norm() - 0.4) < 0.05;
   })) << daemon->printed();
 
-  plant->signal(SIGTERM);
-  EXPECT_EQ(plant->wait(1000ms), 0) << plant->printed();
+  EXPECT_EQ(end(*plant), 0) << plant->printed();
 }
 
 TEST_F(Processes, ShadowCommandsMoveNothing) {
@@ -57,12 +56,11 @@ TEST_F(Processes, AStoppedAndContinuedPlantIsSimulatedOn) {
   ASSERT_TRUE(wait_for([&] { return under_pressure(); })) << daemon->printed();
   plant->signal(SIGSTOP);
   ASSERT_TRUE(wait_for([&] { return mode() == Mode::vent; })) << daemon->printed();
-  wait_for([] { return false; }, 1.0);
+  go_on(1.0);
   plant->signal(SIGCONT);
   EXPECT_TRUE(wait_for([&] { return under_pressure(); })) << daemon->printed();
   EXPECT_NE(plant->printed().find("behind real time"), std::string::npos) << plant->printed();
-  plant->signal(SIGTERM);
-  EXPECT_EQ(plant->wait(1000ms), 0) << plant->printed();
+  EXPECT_EQ(end(*plant), 0) << plant->printed();
 }
 
 TEST_F(Processes, WatchRecordsWhatRunWouldWrite) {
@@ -70,7 +68,7 @@ TEST_F(Processes, WatchRecordsWhatRunWouldWrite) {
   const auto daemon = start("softarmd");
   const auto out = folder_ / "record";
   const auto watch = start("softarm", {"watch", "--duration", "2", "--out", out.string()});
-  ASSERT_EQ(watch->wait(20s), 0) << watch->printed() << daemon->printed();
+  ASSERT_EQ(end_of(*watch), 0) << watch->printed() << daemon->printed();
   for (const char* name : {"log.csv", "summary.json", "timing.json"})
     EXPECT_TRUE(std::filesystem::exists(out / name));
   std::ifstream log(out / "log.csv");

@@ -7,11 +7,13 @@
 #include <lcm/lcm-cpp.hpp>
 
 #include "integration/processes/process.hpp"
+#include "own_url.hpp"
 #include "softarm/client/arm_client.hpp"
 #include "softarm/config/load.hpp"
 #include "softarm/recording/logged_run.hpp"
 #include "softarm/transport/lcm_node.hpp"
 #include "softarm/transport/message_decoding.hpp"
+#include "test_folder.hpp"
 
 namespace softarm {
 namespace {
@@ -31,13 +33,6 @@ class Recordings : public ::testing::Test {
  protected:
   void SetUp() override {
     if (!std::filesystem::exists(kData)) GTEST_SKIP() << "the recordings are not here: " << kData;
-    folder_ = std::filesystem::temp_directory_path() /
-              ("softarm_" + std::to_string(getpid()) + "_" +
-               ::testing::UnitTest::GetInstance()->current_test_info()->name());
-    std::filesystem::create_directories(folder_);
-  }
-  void TearDown() override {
-    if (!folder_.empty()) std::filesystem::remove_all(folder_);
   }
 
   std::filesystem::path import(const char* table, const char* map) {
@@ -49,7 +44,7 @@ class Recordings : public ::testing::Test {
     return log;
   }
 
-  std::filesystem::path folder_;
+  TestFolder folder_;
 };
 
 /// When each new frame arrived, read without our code: times of the log's events whose frame number
@@ -173,7 +168,7 @@ TEST_F(Recordings, SineNeverHolds) {
 }
 
 TEST_F(Recordings, SineJudgedAsAHundredHertzStreamHoldsAndVentsAtItsGaps) {
-  // The same log told to be a 100 Hz stream: every gap beyond 30 ms is one too many, those beyond
+  // The same log declared as a 100 Hz stream: every gap beyond 30 ms is one too many, those beyond
   // 100 ms vent.
   const auto log = import("one_column_sine.csv", "sine_map.yaml");
   Experiment experiment = load_experiment(kSource / "config" / "recorded_sine.yaml");
@@ -200,8 +195,7 @@ TEST_F(Recordings, SineJudgedAsAHundredHertzStreamHoldsAndVentsAtItsGaps) {
 
 TEST_F(Recordings, PlayedIntoAShadowDaemonTheyGoThroughThePipeline) {
   const auto log = import("four_columns_circle.csv", "circle_map.yaml");
-  const std::string url =
-      "udpm://239.255.76.67:" + std::to_string(20000 + getpid() % 12000) + "?ttl=0";
+  const std::string url = test::own_url();
   const auto config = folder_ / "config.yaml";
   std::ofstream(config) << "include: " << kSource / "config" / "recorded_circle.yaml"
                         << "\ndaemon:\n  lcm: {url: \"" << url << "\"}\n";

@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "program_output.hpp"
+#include "test_folder.hpp"
 #include "unit/recording/recorded_log.hpp"
 
 namespace softarm {
@@ -19,20 +20,14 @@ const std::string kConfig = SOFTARM_SOURCE_DIR "/config/paper_arm.yaml";
 
 class Report : public ::testing::Test {
  protected:
-  void SetUp() override {
-    folder_ = fs::temp_directory_path() / ("softarm_report_" + std::to_string(getpid()));
-    fs::create_directories(folder_);
-  }
-  void TearDown() override { fs::remove_all(folder_); }
-
   Outcome report(const std::string& bytes, const std::string& config = kConfig) {
-    std::ofstream(folder_ / "log", std::ios::binary) << bytes;
+    folder_.write("log", bytes);
     return test::run("report --no-plots --out '" + (folder_ / "out").string() + "' '" +
                      (folder_ / "log").string() + "' '" + config + "'");
   }
   /// Second column of log.csv.
   std::vector<std::string> logged_modes() const {
-    std::ifstream file(folder_ / "out" / "log.csv");
+    std::ifstream file(folder_ / "out/log.csv");
     std::vector<std::string> modes;
     for (std::string line; std::getline(file, line);) {
       if (line.empty() || line[0] == '#' || line[0] == 't') continue;
@@ -42,7 +37,7 @@ class Report : public ::testing::Test {
     return modes;
   }
 
-  fs::path folder_;
+  TestFolder folder_;
 };
 
 TEST_F(Report, HasARowForEveryStatusOfALogWithFaultsInIt) {
@@ -62,15 +57,15 @@ TEST_F(Report, StepsOverDamageAndSaysWhere) {
   test::LogBytes log;
   const test::RecordedRun run = test::record_run(load_experiment(kConfig), 1.0, false, log);
   std::string bytes = log.bytes;
-  const std::size_t middle = bytes.size() / 2;
-  bytes.replace(middle, 100, std::string(100, 'x'));
+  const std::size_t event = bytes.find("\xED\xA1\xDA\x01", bytes.size() / 2);
+  bytes.replace(event, 100, std::string(100, 'x'));
   const Outcome outcome = report(bytes);
   EXPECT_EQ(outcome.code, 65);
   EXPECT_NE(outcome.text.find("damaged"), std::string::npos) << outcome.text;
   EXPECT_GE(logged_modes().size(), run.modes.size() - 2);
 }
 
-// A time that is damaged is none: nothing overflows, and the run is no longer for it.
+// A damaged time is left out: nothing overflows, and the run is not longer because of it.
 TEST_F(Report, LeavesOutAStatusOfAnImpossibleTime) {
   test::LogBytes log;
   const test::RecordedRun run = test::record_run(load_experiment(kConfig), 1.0, false, log);
@@ -91,7 +86,7 @@ TEST_F(Report, SaysWhatALogLacks) {
   const Outcome empty = report("");
   EXPECT_EQ(empty.code, 65);
   EXPECT_NE(empty.text.find("status_channel"), std::string::npos) << empty.text;
-  // Of another arm nothing is told.
+  // Of another arm nothing is reported.
   test::LogBytes log;
   test::record_run(load_experiment(kConfig), 0.5, false, log);
   EXPECT_EQ(report(log.bytes, SOFTARM_SOURCE_DIR "/config/one_segment.yaml").code, 65);

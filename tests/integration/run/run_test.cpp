@@ -8,6 +8,7 @@
 #include <sstream>
 
 #include "integration/processes/process.hpp"
+#include "test_folder.hpp"
 
 namespace softarm {
 namespace {
@@ -17,20 +18,8 @@ using test::Process;
 
 const std::string kPaperArm = SOFTARM_SOURCE_DIR "/config/paper_arm.yaml";
 
-std::string read(const std::filesystem::path& file) {
-  std::ostringstream text;
-  text << std::ifstream(file, std::ios::binary).rdbuf();
-  return text.str();
-}
-
 class Run : public ::testing::Test {
  protected:
-  Run() {
-    std::string pattern = (std::filesystem::temp_directory_path() / "softarm_run_XXXXXX").string();
-    folder = mkdtemp(pattern.data());
-  }
-  ~Run() override { std::filesystem::remove_all(folder); }
-
   /// Exit code; what the program printed is in `printed`.
   int start(const std::string& program, const std::vector<std::string>& arguments) {
     Process process(program, arguments, (folder / "printed").string());
@@ -43,11 +32,10 @@ class Run : public ::testing::Test {
                              "--out", (folder / out).string()});
   }
   std::string write(const std::string& name, const std::string& text) const {
-    std::ofstream(folder / name) << text;
-    return (folder / name).string();
+    return folder.write(name, text).string();
   }
 
-  std::filesystem::path folder;
+  TestFolder folder;
   std::string printed;
 };
 
@@ -56,16 +44,16 @@ TEST_F(Run, SameSeedSameBytes) {
   ASSERT_EQ(run_paper_arm("b", "7"), 0) << printed;
   ASSERT_EQ(run_paper_arm("c", "8"), 0) << printed;
   for (const char* name : {"log.csv", "summary.json"}) {
-    const std::string first = read(folder / "a" / name);
+    const std::string first = file_text(folder / "a" / name);
     EXPECT_GT(first.size(), 200u) << name;
-    EXPECT_TRUE(first == read(folder / "b" / name)) << name << " differs from run to run";
-    EXPECT_FALSE(first == read(folder / "c" / name)) << name << " does not depend on the seed";
+    EXPECT_TRUE(first == file_text(folder / "b" / name)) << name << " differs from run to run";
+    EXPECT_FALSE(first == file_text(folder / "c" / name)) << name << " does not depend on the seed";
   }
 }
 
 TEST_F(Run, LeavesWhatItPromises) {
   ASSERT_EQ(run_paper_arm("out", "1"), 0) << printed;
-  const YAML::Node summary = YAML::Load(read(folder / "out" / "summary.json"));
+  const YAML::Node summary = YAML::Load(file_text(folder / "out" / "summary.json"));
   EXPECT_NEAR(summary["duration_s"].as<double>(), 3.0, 0.01);
   EXPECT_EQ(summary["ticks"].as<int>(), 1500);
   const YAML::Node tracking = summary["tracking"];
@@ -84,13 +72,13 @@ TEST_F(Run, LeavesWhatItPromises) {
   EXPECT_NEAR(in_modes_s, 3.0, 0.01);
   EXPECT_GT(summary["modes"]["ACTIVE"].as<double>(-1.0), 2.5);
 
-  const YAML::Node timing = YAML::Load(read(folder / "out" / "timing.json"));
+  const YAML::Node timing = YAML::Load(file_text(folder / "out" / "timing.json"));
   EXPECT_GT(timing["real_time_factor"].as<double>(-1.0), 0.0);
   for (const char* key : {"p50", "p99", "max"})
     EXPECT_GT(timing["tick_us"][key].as<double>(-1.0), 0.0) << key;
 
   // Comment lines, a header, then a row a tick with as many cells as the header.
-  std::istringstream log(read(folder / "out" / "log.csv"));
+  std::istringstream log(file_text(folder / "out" / "log.csv"));
   std::string line;
   std::size_t comments = 0, rows = 0;
   std::ptrdiff_t commas = -1;
@@ -118,8 +106,9 @@ TEST_F(Run, WithExplicitArmingTheArmIsArmed) {
   const std::string out = (folder / "out").string();
   ASSERT_EQ(start("softarm", {"run", config, "--duration", "3", "--no-plots", "--out", out}), 0)
       << printed;
-  EXPECT_GT(YAML::Load(read(folder / "out" / "summary.json"))["modes"]["ACTIVE"].as<double>(-1.0),
-            2.5);
+  EXPECT_GT(
+      YAML::Load(file_text(folder / "out" / "summary.json"))["modes"]["ACTIVE"].as<double>(-1.0),
+      2.5);
 }
 
 TEST_F(Run, AnArmThatWasNeverActiveIsAFailureWithItsReason) {

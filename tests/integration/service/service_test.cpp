@@ -8,12 +8,10 @@
 namespace softarm {
 namespace {
 
-using namespace std::chrono_literals;
 using test::AddressKind;
 using test::NotifySocket;
 
 constexpr int kWatchdog_ms = 300;
-constexpr double kPatience_s = 30.0;
 
 class Service : public ::testing::TestWithParam<AddressKind>, protected test::Station {
  protected:
@@ -23,22 +21,20 @@ class Service : public ::testing::TestWithParam<AddressKind>, protected test::St
     } catch (const TransportError& error) {
       GTEST_SKIP() << error.what();
     }
-    // Thresholds that a busy machine does not reach by itself.
-    write_config("paper_arm.yaml",
-                 "  safety: {hold_after_s: 0.1, vent_after_s: 0.25, good_frames: 20}\n");
+    arm_when_asked();
     setenv("WATCHDOG_USEC", std::to_string(1000 * kWatchdog_ms).c_str(), 1);
   }
 
-  /// Reads on until the manager is told this; what came later stays to be read.
+  /// Reads on until the manager received this; what came later stays to be read.
   bool hears(const std::string& text) {
     const auto reads_it = [&] {
-      for (std::string told = manager_.next(); !told.empty(); told = manager_.next()) {
-        heard_ += told;
-        if (told.find(text) != std::string::npos) return true;
+      for (std::string message = manager_.next(); !message.empty(); message = manager_.next()) {
+        heard_ += message;
+        if (message.find(text) != std::string::npos) return true;
       }
       return false;
     };
-    return wait_for(reads_it, kPatience_s);
+    return wait_for(reads_it);
   }
 
   NotifySocket manager_{GetParam()};
@@ -61,18 +57,18 @@ TEST_P(Service, HearsOfReadinessModesHealthAndStop) {
   ASSERT_TRUE(hears("STATUS=VENT (time_gap)\n")) << daemon->printed();
   ASSERT_TRUE(hears("WATCHDOG=1")) << daemon->printed();
 
-  ASSERT_TRUE(wait_for([&] { return under_pressure() && active_in_row_ > 0; }, kPatience_s))
+  ASSERT_TRUE(wait_for([&] { return under_pressure() && active_in_row_ > 0; }))
       << daemon->printed();
   daemon->signal(SIGTERM);
   ASSERT_TRUE(hears("STOPPING=1")) << daemon->printed();
-  EXPECT_EQ(daemon->wait(10s), 0) << daemon->printed();
+  EXPECT_EQ(end_of(*daemon), 0) << daemon->printed();
   EXPECT_TRUE(wait_for([&] { return reason() == Reason::shutdown; }));
   EXPECT_TRUE(wait_for([&] { return largest(command_.pressure_bar) == 0.0F; }))
       << "the last command is vent";
   EXPECT_FALSE(heard_.find("STOPPING=1") < heard_.find("STATUS=ACTIVE"));
 }
 
-TEST_P(Service, IsNotToldOfHealthThatItDidNotAskThisProcessFor) {
+TEST_P(Service, GetsNoHealthReportThatItDidNotAskThisProcessFor) {
   setenv("WATCHDOG_PID", std::to_string(getpid()).c_str(), 1);
   const auto daemon = start("softarmd");
   ASSERT_TRUE(hears("READY=1")) << daemon->printed();
@@ -80,14 +76,14 @@ TEST_P(Service, IsNotToldOfHealthThatItDidNotAskThisProcessFor) {
   ASSERT_TRUE(wait_for([&] { return statuses_ > 500; })) << daemon->printed();
   daemon->signal(SIGTERM);
   ASSERT_TRUE(hears("STOPPING=1")) << daemon->printed();
-  EXPECT_EQ(daemon->wait(10s), 0) << daemon->printed();
+  EXPECT_EQ(end_of(*daemon), 0) << daemon->printed();
   EXPECT_EQ(heard_.find("WATCHDOG"), std::string::npos) << heard_;
 }
 
-TEST_P(Service, IsNotToldThatAWrongConfigurationIsReady) {
+TEST_P(Service, IsNotNotifiedThatAWrongConfigurationIsReady) {
   write_config("paper_arm.yaml", "  no_such_key: 1\n");
-  EXPECT_EQ(start("softarmd")->wait(10s), 78);
-  EXPECT_EQ(start("softarm-valves")->wait(10s), 78);
+  for (const char* program : {"softarmd", "softarm-valves"})
+    EXPECT_EQ(end_of(*start(program)), 78) << program;
   EXPECT_EQ(manager_.next(), "");
 }
 
@@ -101,7 +97,7 @@ TEST_P(Service, HearsOfValvesWithoutATerminal) {
   ASSERT_TRUE(hears("WATCHDOG=1")) << valves->printed();
   valves->signal(SIGTERM);
   ASSERT_TRUE(hears("STOPPING=1")) << valves->printed();
-  EXPECT_EQ(valves->wait(10s), 0) << "nothing was ever written: " << valves->printed();
+  EXPECT_EQ(end_of(*valves), 0) << "nothing was ever written: " << valves->printed();
 }
 
 INSTANTIATE_TEST_SUITE_P(Sockets, Service,

@@ -10,6 +10,7 @@
 #include "softarm/commissioning/identification/coverage.hpp"
 #include "softarm/commissioning/identification/linear_fit.hpp"
 #include "softarm/config/load.hpp"
+#include "test_folder.hpp"
 
 namespace softarm {
 namespace {
@@ -38,7 +39,7 @@ TEST(Identify, LeastSquaresFindThePccPlantsOwnParameters) {
   Experiment experiment = load_experiment(kConfig / "paper_simulation.yaml");
   experiment.plant.kind = PccSettings{};
   for (SegmentParameters& segment : experiment.plant.arm.segments) {
-    segment.stiffness_nm_per_rad = 2.7;  // not what the controller believes
+    segment.stiffness_nm_per_rad = 2.7;  // not what the controller is configured with
     segment.damping_nms_per_rad = 0.35;
   }
   const Linear found = linear(experiment, false);
@@ -66,7 +67,7 @@ TEST(Identify, ReadsSixLinksAsTheSegmentTheyAre) {
   EXPECT_NEAR(found.value(1), 0.5, 0.05 * 0.5);
 }
 
-TEST(Identify, RefusesWhatTellsNothing) {
+TEST(Identify, RefusesUninformativeMotion) {
   const Experiment experiment = load_experiment(kConfig / "paper_simulation.yaml");
   FitChoice choice;
   choice.lag = choice.delay = false;
@@ -107,8 +108,7 @@ TEST(Identify, RecoversThePapersArmWithinTwoPercent) {
 }
 
 TEST(Identify, WritesAnExperimentWhosePlantIsUnchanged) {
-  std::string pattern = (fs::temp_directory_path() / "softarm_identify_XXXXXX").string();
-  const fs::path folder = mkdtemp(pattern.data());
+  const TestFolder folder;
   const fs::path config = kConfig / "paper_arm_mismatch.yaml", output = folder / "identified.yaml";
   test::Process process(
       "softarm",
@@ -129,7 +129,6 @@ TEST(Identify, WritesAnExperimentWhosePlantIsUnchanged) {
       EXPECT_NEAR(before.plant.actuation.segments[i][j].gain_nm_per_bar,
                   after.plant.actuation.segments[i][j].gain_nm_per_bar, 1e-5);
   }
-  fs::remove_all(folder);
 }
 
 }  // namespace

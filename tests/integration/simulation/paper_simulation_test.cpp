@@ -1,4 +1,4 @@
-// Section VI: an arm of links, a controller that believes in constant curvature, a path of the tip.
+// Section VI: an arm of links, a controller that models constant curvature, a path of the tip.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -102,7 +102,7 @@ Experiment on_the_model(Experiment experiment) {
   return experiment;
 }
 
-TEST(PaperSimulation, AHoldFreezesTheReferenceAndItStartsAnewWhereTheArmIs) {
+TEST(PaperSimulation, AHoldFreezesTheReferenceAndItStartsAgainWhereTheArmIs) {
   Experiment experiment = on_the_model(configured("paper_simulation_noisy.yaml"));
   experiment.plant.mocap.dropout_probability = 0.25;
   experiment.safety.good_frames = 5;

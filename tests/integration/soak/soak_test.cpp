@@ -11,6 +11,7 @@
 
 #include "integration/processes/process.hpp"
 #include "softarm/transport/lcm_node.hpp"
+#include "test_folder.hpp"
 
 namespace softarm {
 namespace {
@@ -26,11 +27,6 @@ class Soak : public ::testing::Test {
     } catch (const TransportError& error) {
       GTEST_SKIP() << error.what();
     }
-    std::string pattern = (std::filesystem::temp_directory_path() / "softarm_soak_XXXXXX").string();
-    folder = mkdtemp(pattern.data());
-  }
-  void TearDown() override {
-    if (!folder.empty()) std::filesystem::remove_all(folder);
   }
 
   std::unique_ptr<Process> start(std::vector<std::string> more) {
@@ -45,7 +41,7 @@ class Soak : public ::testing::Test {
     return begin == std::string::npos ? YAML::Node() : YAML::Load(printed.substr(begin));
   }
 
-  std::filesystem::path folder;
+  TestFolder folder;
 };
 
 TEST_F(Soak, TenSecondsOfRandomFaultsAreAnsweredAndRecovered) {
@@ -67,9 +63,7 @@ TEST_F(Soak, TenSecondsOfRandomFaultsAreAnsweredAndRecovered) {
 TEST_F(Soak, ADaemonThatEndsByItselfIsAFailure) {
   const auto soak = start({"--duration", "60", "--between", "4"});
   const auto prints = [&](const char* what) {
-    std::ostringstream text;
-    text << std::ifstream(folder / "out/softarmd_1.txt").rdbuf();
-    return text.str().find(what) != std::string::npos;
+    return file_text(folder / "out/softarmd_1.txt").find(what) != std::string::npos;
   };
   while (!prints("ACTIVE") && soak->wait(10ms) < 0) {
   }

@@ -39,7 +39,7 @@ assert read(TIMEOUT, 1) == [200]
 wanted = [100 * (v % 4) for v in range(VALVES)]
 assert wait_for(lambda r: all(abs(r[3 * v] - wanted[v]) <= 2 for v in range(VALVES)), wanted), "pressures do not follow"
 assert read(READ, 3 * VALVES)[1::3] == wanted, "set points read back differ"
-assert wait_for(lambda r: max(r[0::3]) <= 2, None), "it does not vent when nobody writes"
+assert wait_for(lambda r: max(r[0::3]) <= 2, None), "it does not vent without writes"
 assert read(WRITE, VALVES) == [0] * VALVES, "its time-out leaves set points"
 assert client.write_registers(READ, [1], slave=1).isError(), "measured pressures can be written"
 assert client.read_holding_registers(100, 1, slave=1).isError(), "registers that are not there can be read"

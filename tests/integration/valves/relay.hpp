@@ -41,11 +41,11 @@ class Relay {
 
   int port() const { return port_; }
 
-  std::atomic<int> server_port_;            ///< may change while nobody is connected
+  std::atomic<int> server_port_;            ///< may change while there is no connection
   std::atomic<int> delay_us{0};             ///< of every answer
   std::atomic<bool> exceptions{false};      ///< every answer becomes "server device failure"
   std::atomic<bool> cut_next_write{false};  ///< half a write goes through, then both sides are cut
-  std::atomic<bool> refuse{false};          ///< nobody gets through
+  std::atomic<bool> refuse{false};          ///< connections are refused
   std::atomic<int> stuck_word{-1};          ///< of every longer answer, which then reads `stuck_at`
   std::atomic<int> stuck_at{0};
   std::atomic<int> connections{0};

@@ -11,7 +11,6 @@
 namespace softarm {
 namespace {
 
-using namespace std::chrono_literals;
 using test::kChambers;
 using test::PressureBoard;
 using Answer = PressureBoard::Answer;
@@ -19,12 +18,8 @@ using Answer = PressureBoard::Answer;
 class SerialBoard : public test::ValvesProgram {
  protected:
   void begin() {
-    write_config(1, ", backend: serial_board, device: " + board_.device());
+    configure(1, ", backend: serial_board, device: " + board_.device());
     driver_ = start("example_serial_pressure_board");
-  }
-  void TearDown() override {
-    driver_.reset();
-    ValvesProgram::TearDown();
   }
   bool board_has(double bar) const {
     const std::vector<double> all = board_.set_points_bar();
@@ -33,12 +28,10 @@ class SerialBoard : public test::ValvesProgram {
            });
   }
   bool run_at(double bar) {
-    return wait_for(
-        [&] {
-          return is(ValveState::running, ValveReason::none) && board_has(bar) &&
-                 std::abs(static_cast<double>(measured_.pressure_bar[kChambers - 1]) - bar) < 1e-3;
-        },
-        bar);
+    return command_until(bar, [&] {
+      return is(ValveState::running, ValveReason::none) && board_has(bar) &&
+             std::abs(static_cast<double>(measured_.pressure_bar[kChambers - 1]) - bar) < 1e-3;
+    });
   }
 
   PressureBoard board_;
@@ -53,8 +46,7 @@ TEST_F(SerialBoard, CommandsReachItExpireAndAStopVents) {
     return is(ValveState::vented, ValveReason::no_command) && board_has(0.0);
   })) << driver_->printed();
   ASSERT_TRUE(run_at(0.4));
-  driver_->signal(SIGTERM);
-  EXPECT_EQ(driver_->wait(1000ms), 0) << driver_->printed();
+  EXPECT_EQ(end(*driver_), 0) << driver_->printed();
   EXPECT_TRUE(board_has(0.0));
 }
 
@@ -64,9 +56,10 @@ TEST_F(SerialBoard, WhateverItAnswersInsteadOfPressuresVentsAndIsSurvived) {
        {Answer::none, Answer::noise, Answer::flood, Answer::one_too_few, Answer::not_a_number}) {
     ASSERT_TRUE(run_at(0.3)) << static_cast<int>(answer) << driver_->printed();
     board_.answer = answer;
-    ASSERT_TRUE(wait_for([&] { return is(ValveState::disconnected, ValveReason::no_answer); }, 0.3))
+    ASSERT_TRUE(
+        command_until(0.3, [&] { return is(ValveState::disconnected, ValveReason::no_answer); }))
         << static_cast<int>(answer) << driver_->printed();
-    EXPECT_TRUE(wait_for([&] { return board_has(0.0); }, 0.3)) << static_cast<int>(answer);
+    EXPECT_TRUE(command_until(0.3, [&] { return board_has(0.0); })) << static_cast<int>(answer);
     board_.answer = Answer::good;
   }
   EXPECT_TRUE(run_at(0.3)) << driver_->printed();
@@ -75,9 +68,9 @@ TEST_F(SerialBoard, WhateverItAnswersInsteadOfPressuresVentsAndIsSurvived) {
 TEST_F(SerialBoard, ThatDoesNotTakeItsTimeOutIsNeverPressurised) {
   board_.takes_timeout = false;
   begin();
-  ASSERT_TRUE(wait_for([&] { return status_.connections > 0; }, 0.7)) << driver_->printed();
-  EXPECT_TRUE(
-      wait_for([&] { return is(ValveState::disconnected, ValveReason::failsafe_refused); }, 0.7));
+  ASSERT_TRUE(command_until(0.7, [&] { return valves().connections > 0; })) << driver_->printed();
+  EXPECT_TRUE(command_until(
+      0.7, [&] { return is(ValveState::disconnected, ValveReason::failsafe_refused); }));
   EXPECT_EQ(board_.highest_ever_bar(), 0.0);
 }
 
@@ -85,28 +78,27 @@ TEST_F(SerialBoard, WhosePlugIsPulledIsNotConnected) {
   begin();
   ASSERT_TRUE(run_at(0.3)) << driver_->printed();
   board_.unplug();
-  ASSERT_TRUE(
-      wait_for([&] { return is(ValveState::disconnected, ValveReason::no_connection); }, 0.3))
-      << driver_->printed();
+  ASSERT_TRUE(command_until(0.3, [&] {
+    return is(ValveState::disconnected, ValveReason::no_connection);
+  })) << driver_->printed();
   EXPECT_TRUE(wait_for([&] {
     return driver_->printed().find("DISCONNECTED (no connection): " + board_.device()) !=
            std::string::npos;
   })) << driver_->printed();
-  driver_->signal(SIGTERM);
-  EXPECT_EQ(driver_->wait(1000ms), 1) << "nobody confirmed zero" << driver_->printed();
+  EXPECT_EQ(end(*driver_), 1) << "zero was not confirmed" << driver_->printed();
 }
 
 TEST_F(SerialBoard, BelongsToOneDriver) {
   begin();
-  ASSERT_TRUE(wait_for([&] { return state() == ValveState::vented; })) << driver_->printed();
+  ASSERT_TRUE(wait_for([&] { return valves().state == ValveState::vented; })) << driver_->printed();
   const auto other = start("example_serial_pressure_board");
-  EXPECT_EQ(other->wait(5s), 75) << other->printed();
+  EXPECT_EQ(end_of(*other), 75) << other->printed();
 }
 
 TEST_F(SerialBoard, IsUnknownToTheProgramThatHasNoSuchBackEnd) {
-  write_config(1, ", backend: serial_board, device: " + board_.device());
+  configure(1, ", backend: serial_board, device: " + board_.device());
   const auto ours = start("softarm-valves");
-  EXPECT_EQ(ours->wait(5s), 78);
+  EXPECT_EQ(end_of(*ours), 78);
   EXPECT_NE(ours->printed().find("config.yaml: valves.backend: expected one that this program has "
                                  "(modbus), got serial_board"),
             std::string::npos)

@@ -10,7 +10,7 @@
 namespace softarm {
 namespace {
 
-/// A machine on which a call of each of two functions takes as long as it is told, and everything
+/// A machine on which a call of each of two functions takes a configured time, and everything
 /// else a microsecond.
 class Machine {
  public:

@@ -1,4 +1,4 @@
-// KDL's chain is our arm: without that its time would say nothing. Its m(q) is written on its own,
+// KDL's chain is our arm: without that its time would have no meaning. Its m(q) is independent,
 // so this also holds Table I against the direct route by code that is not ours.
 //
 // Tolerance 1e-12 of the size that entries can have (reference::Dynamics): KDL sums the motion of

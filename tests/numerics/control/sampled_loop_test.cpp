@@ -141,7 +141,7 @@ TEST(IntegralGain, MakesTheTipGiveWayNoMoreAndTracksUnderAWrongModel) {
   EXPECT_LT(std::abs(measured_tip_compliance(experiment, 0.02)), 0.02 * without);
 }
 
-TEST(ControlBench, TellsWellFormedJson) {
+TEST(ControlBench, PrintsWellFormedJson) {
   Experiment experiment = configured("paper_arm.yaml");
   experiment.run.tracking_from_s = 0.2;
   const ControlScene scene = bench_scene(experiment, 1.0, 0.02, [](const std::string&) {});

@@ -4,7 +4,7 @@
 // The size of a term is the sum of the magnitudes that the masses contribute (Cauchy's inequality
 // over the masses): s_i s_j for B, s_i (r_j + s_j |u'|) for C, s_i sqrt(mass) |g| for G, and their
 // sums for the recursion; s_i = sqrt(sum mu |J_i|^2), r_j = sqrt(sum mu |J_j-dot|^2). What is small
-// against it is the difference of larger contributions, and a relative error of its own is more
+// against it is the difference of larger contributions, and an error relative to itself is more
 // than the rounding of u itself leaves. Positions and Jacobians count against the arm's length.
 #pragma once
 
@@ -68,10 +68,24 @@ struct Errors {
   }
 };
 
+/// Is there a B to divide by in double? Not with point masses of long arms, every segment of which
+/// costs a digit; nor of segments that stretch and are bent by nearly a full turn, whose own columns
+/// vanish there.
+inline bool solvable(const ArmParameters& arm, const State& state) {
+  if (arm.mass == MassModel::distributed) return true;
+  double theta = 0.0;
+  for (int i = 0; arm.extensible && i < arm.size(); ++i) {
+    theta = std::max(theta, state.u.segment<2>(3 * i).norm());
+  }
+  return arm.size() <= 7 && theta < 5.5;
+}
+
 class AgainstReference {
  public:
   /// @param state u, u' and u'' for the recursion; its second velocity is made of the two.
-  AgainstReference(const ArmParameters& arm, const State& state, bool with_forward = true)
+  AgainstReference(const ArmParameters& arm, const State& state)
+      : AgainstReference(arm, state, solvable(arm, state)) {}
+  AgainstReference(const ArmParameters& arm, const State& state, bool with_forward)
       : arm_(arm),
         state_(state),
         dof_(arm.dof()),
@@ -79,7 +93,7 @@ class AgainstReference {
         u_(state.u.cast<long double>()),
         v_(state.v.cast<long double>()),
         want_(reference::dynamics(arm, u_, v_)) {
-    speed_ = v_.cwiseAbs().maxCoeff();
+    speed_ = largest_rate(arm, u_, v_);
     kinematics();
     matrices();
     recursion();
@@ -96,7 +110,10 @@ class AgainstReference {
   void kinematics() {
     const auto want = reference::kinematics(arm_, u_, v_);
     long double length = 0;
-    for (const auto& s : arm_.segments) length += s.length_m;
+    for (int i = 0; i < arm_.size(); ++i) {
+      length += arm_.segments[static_cast<std::size_t>(i)].length_m;
+      if (arm_.extensible) length += u_(3 * i + 2);
+    }
     const auto largest = [](const Matrix& m) { return m.cwiseAbs().maxCoeff(); };
     const Eigen::Isometry3d pose = tip_pose(arm_, state_.u);
     errors_.add(rotation, largest(pose.linear().cast<long double>() - want.rotations.back()));
@@ -107,9 +124,15 @@ class AgainstReference {
     mass_centres(arm_, state_.u, got);
     errors_.add(centres, largest(got.cast<long double>() - want.centres) / (length + offset));
     tip_jacobians(arm_, state_.u, state_.v, J, J_rate);
-    errors_.add(jacobian, largest(J.cast<long double>() - want.jacobian) / length);
-    errors_.add(jacobian_rate, largest(J_rate.cast<long double>() - want.jacobian_rate) /
-                                   (largest(want.jacobian_rate) + length * speed_ + smallest_));
+    // Columns along e, m/m, count as the others, m/rad: for a strain of the whole arm.
+    const auto in_metres = [&](Matrix columns) {
+      for (int j = 2; arm_.extensible && j < dof_; j += 3) columns.col(j) *= length;
+      return columns;
+    };
+    errors_.add(jacobian, largest(in_metres(J.cast<long double>() - want.jacobian)) / length);
+    errors_.add(jacobian_rate,
+                largest(in_metres(J_rate.cast<long double>() - want.jacobian_rate)) /
+                    (largest(in_metres(want.jacobian_rate)) + length * speed_ + smallest_));
     tip_angular_jacobian(arm_, state_.u, J);
     errors_.add(angular_jacobian, largest(J.cast<long double>() - want.angular_jacobian));
   }
@@ -136,7 +159,8 @@ class AgainstReference {
   }
 
   void recursion() {
-    const Eigen::VectorXd b = 0.7 * state_.v.reverse() + 0.3 * state_.a;
+    const Eigen::VectorXd other = arm_.extensible ? Eigen::VectorXd(-state_.v) : state_.v.reverse();
+    const Eigen::VectorXd b = 0.7 * other + 0.3 * state_.a;
     const Vector b_exact = b.cast<long double>(), x = state_.a.cast<long double>();
     Eigen::VectorXd force(dof_), all(dof_);
     inverse_dynamics(arm_, workspace_, state_.u, state_.v, b, state_.a,

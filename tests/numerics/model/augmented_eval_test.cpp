@@ -6,6 +6,7 @@
 #include <string>
 
 #include "program_output.hpp"
+#include "test_folder.hpp"
 #include "unit/model/golden.hpp"
 
 namespace softarm {
@@ -24,13 +25,11 @@ class EvalAugmented : public ::testing::Test {
     for (const auto& one : YAML::LoadFile(golden::path())["cases"]) {
       if (one["config"]["coords"].as<std::string>() == "polar") polar["cases"].push_back(one);
     }
-    path_ = ::testing::TempDir() + "softarm_eval_augmented_" +
-            ::testing::UnitTest::GetInstance()->current_test_info()->name() + ".yaml";
     std::ofstream(path_) << polar;
   }
-  void TearDown() override { std::remove(path_.c_str()); }
 
-  std::string path_;
+  const TestFolder folder_;
+  const std::string path_ = (folder_ / "cases.yaml").string();
 };
 
 TEST_F(EvalAugmented, GoldenPolarCases) {

@@ -6,7 +6,8 @@
 #include <string>
 
 #include "program_output.hpp"
-#include "unit/model/golden.hpp"
+#include "test_folder.hpp"
+#include "unit/model/extensible_golden.hpp"
 
 namespace softarm {
 namespace {
@@ -91,20 +92,52 @@ void compare(const std::string& mass) {
 TEST(Eval, GoldenCasesWithPointMasses) { compare("point"); }
 TEST(Eval, GoldenCasesWithDistributedMass) { compare("distributed"); }
 
+void compare_extensible(const std::string& mass) {
+  const Outcome outcome = run(golden::path("extensible.json") + " --mass " + mass);
+  ASSERT_EQ(outcome.code, 0) << outcome.text;
+  const YAML::Node output = YAML::Load(outcome.text)["cases"];
+  ASSERT_EQ(output.size(), golden::extensible_cases().size());
+  for (std::size_t i = 0; i < output.size(); ++i) {
+    const golden::Case& c = golden::extensible_cases()[i];
+    EXPECT_EQ(output[i]["id"].as<std::string>(), c.id);
+    const golden::Terms got = golden::terms(output[i]);
+    const golden::Terms& basis = mass == "point" ? c.expected : c.distributed;
+    const auto check = [&](const golden::Terms& wanted, const golden::Terms& printed,
+                           std::initializer_list<const char*> keys) {
+      for (const std::string key : keys) {
+        ASSERT_TRUE(wanted.contains(key) && printed.contains(key)) << c.id << " " << key;
+        EXPECT_LE(
+            golden::extensible_error_over_tolerance(c, basis, key, wanted.at(key), printed.at(key)),
+            0.1)
+            << c.id << " " << key;
+      }
+    };
+    // What does not depend on where the mass sits is the same for both.
+    check(c.expected, got,
+          {"T_world", "T_local", "com_world", "J_tip", "Jdot_tip", "Jw_tip", "G", "K", "D",
+           "A_chamber", "gravity_potential"});
+    check(basis, got, {"B", "C", "Cqd", "G", "kinetic_energy"});
+    check(mass == "point" ? c.control : c.distributed, got, {"tau", "tau_A_chamber"});
+    check(mass == "point" ? c.forward : c.distributed, got, {"qdd_chamber"});
+    check(c.chamber, golden::chamber_terms(output[i]), {"generalized_force", "length"});
+    for (const char* key : {"A_couple", "tau_A_couple", "qdd_couple"}) {
+      EXPECT_TRUE(output[i][key].IsNull()) << c.id << " " << key;  // the couple knows no elongation
+    }
+  }
+}
+
+TEST(Eval, ArmsThatStretchWithPointMasses) { compare_extensible("point"); }
+TEST(Eval, ArmsThatStretchWithDistributedMass) { compare_extensible("distributed"); }
+
 class EvalFile : public ::testing::Test {
  protected:
-  void SetUp() override {
-    path_ = ::testing::TempDir() + "softarm_eval_" +
-            ::testing::UnitTest::GetInstance()->current_test_info()->name() + ".yaml";
-  }
-  void TearDown() override { std::remove(path_.c_str()); }
-
   Outcome eval(const std::string& text, const std::string& options = "") {
     std::ofstream(path_) << text;
     return run(path_ + " " + options);
   }
 
-  std::string path_;
+  const TestFolder folder_;
+  const std::string path_ = (folder_ / "cases.yaml").string();
   const std::string arm_ =
       "  config: {n: 1, coords: cartesian_u, gravity: [0, 0, -9.81],\n"
       "    base_rotation: [[1, 0, 0], [0, -1, 0], [0, 0, -1]], base_position: [0, 0, 0],\n"
@@ -130,7 +163,7 @@ TEST_F(EvalFile, NotFiniteIsNull) {
   EXPECT_TRUE(one["K"].IsSequence());
 }
 
-TEST_F(EvalFile, FaultsAreToldWithTheirPlace) {
+TEST_F(EvalFile, FaultsAreReportedWithTheirPlace) {
   const auto expect = [](const Outcome& outcome, const std::string& part) {
     EXPECT_EQ(outcome.code, 78) << outcome.text;
     EXPECT_NE(outcome.text.find(part), std::string::npos) << outcome.text;
@@ -141,6 +174,35 @@ TEST_F(EvalFile, FaultsAreToldWithTheirPlace) {
   expect(eval("cases: [}"), "YAML");
   expect(eval("7"), "expected a map");
   expect(run("/nowhere/at/all.json"), "/nowhere/at/all.json");
+}
+
+TEST_F(EvalFile, FaultsOfArmsThatStretch) {
+  const std::string arm =
+      "cases:\n- id: a\n  config: {n: 1, coords: cartesian_ue, gravity: [0, 0, -9.81],\n"
+      "    base_rotation: [[1, 0, 0], [0, -1, 0], [0, 0, -1]], base_position: [0, 0, 0],\n"
+      "    L: [0.11], mu: [0.15], k: [0.626], beta: [0.029], k_a: [4000], ";
+  const std::string chambers = "beta_a: [185], chambers: [{chi: [0, 2, 4], r: 0.01, a: 60}]}\n";
+  const std::string state = "  q: [0.1, 0.2, 0.01]\n  qd: [0, 0, 0]\n";
+  const auto expect = [](const Outcome& outcome, const std::string& part) {
+    EXPECT_EQ(outcome.code, 78) << outcome.text;
+    EXPECT_NE(outcome.text.find(part), std::string::npos) << outcome.text;
+  };
+  const Outcome plain = eval(arm + "beta_a: [185]}\n" + state);
+  ASSERT_EQ(plain.code, 0) << plain.text;
+  const YAML::Node one = YAML::Load(plain.text)["cases"][0];
+  EXPECT_DOUBLE_EQ(one["K"][2][2].as<double>(), 4000.0);
+  EXPECT_FALSE(one["chambers"]);
+
+  expect(eval(arm + "}\n" + state), "config.beta_a");
+  expect(eval(arm + "beta_a: [185]}\n  q: [0.1, 0.2]\n  qd: [0, 0, 0]\n"), "cases[0].q: expected");
+  expect(eval(arm + "beta_a: [185]}\n  q: [0.1, 0.2, -0.11]\n  qd: [0, 0, 0]\n"),
+         "cases[0].q[2]: expected an elongation above -0.11 m");
+  expect(eval(arm + "beta_a: [185]}\n" + state + "  chambers: {pressure: [[1, 1, 1]]}\n"),
+         "config.chambers");
+  expect(eval(arm + chambers + state + "  chambers: {pressure: [[1, 1]]}\n"),
+         "cases[0].chambers.pressure[0]: expected a list of 3");
+  expect(eval(arm + chambers + state + "  ik: {lambda1: 1}\n"), "coords polar or cartesian_u");
+  EXPECT_EQ(eval(arm + chambers + state, "--method augmented").code, 64);
 }
 
 TEST(Eval, UnknownOptionsAreUsageErrors) {

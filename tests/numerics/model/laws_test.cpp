@@ -19,6 +19,7 @@ namespace {
 
 using reference::Real;
 using reference::Vector;
+using testing_support::largest_rate;
 using testing_support::RandomArm;
 using testing_support::State;
 
@@ -37,7 +38,7 @@ Matrices evaluate(const ArmParameters& arm, const State& s) {
   return m;
 }
 
-class Laws : public ::testing::TestWithParam<MassModel> {
+class Laws : public ::testing::TestWithParam<testing_support::ArmKind> {
  protected:
   /// Arms of 1 to 64 segments, some with neighbours of very different size.
   template <class Check>
@@ -47,7 +48,7 @@ class Laws : public ::testing::TestWithParam<MassModel> {
       for (int k = 0; k < (n < 10 ? 60 : 3); ++k) {
         const double ratio = k % 3 == 0 ? 1e6 : k % 3 == 1 ? 30.0 : 2.0;
         const ArmParameters arm = random.arm(n, GetParam(), ratio);
-        State s = random.state(n, n > 10 ? 3.0 : 7.0, k % 5 == 0 ? 1e3 : 2.0);
+        State s = random.state(arm, n > 10 ? 3.0 : 7.0, k % 5 == 0 ? 1e3 : 2.0);
         if (k % 4 == 0) s.u.head<2>().setZero();
         check(arm, s, random);
         if (HasFailure()) FAIL() << n << " segments, trial " << k;
@@ -88,17 +89,17 @@ TEST_P(Laws, InertiaRateMinusTwiceCoriolisIsSkew) {
   for (int k = 0; k < 60; ++k) {
     const int n = 1 + k % 6;
     const ArmParameters arm = random.arm(n, GetParam(), k % 2 == 0 ? 1e3 : 3.0);
-    const State s = random.state(n, 7.0);
+    const State s = random.state(arm, 7.0);
     const Vector u = s.u.cast<Real>(), v = s.v.cast<Real>();
     const Real h = 1e-4L;
     const auto B = [&](Real step) { return reference::dynamics(arm, u + step * v, v).B; };
-    const reference::Matrix rate = (8 * (B(h) - B(-h)) - (B(2 * h) - B(-2 * h))) / (12 * h);
+    const reference::Matrix B_rate = (8 * (B(h) - B(-h)) - (B(2 * h) - B(-2 * h))) / (12 * h);
     const auto sizes = reference::dynamics(arm, u, v);
     const reference::Matrix C = evaluate(arm, s).C.cast<Real>();
-    const reference::Matrix skew = rate - C - C.transpose();
+    const reference::Matrix skew = B_rate - C - C.transpose();
     for (int i = 0; i < arm.dof(); ++i) {
       for (int j = 0; j < arm.dof(); ++j) {
-        const Real speed = v.cwiseAbs().maxCoeff();
+        const Real speed = largest_rate(arm, u, v);
         const Real size = sizes.s(i) * (sizes.r(j) + speed * sizes.s(j)) +
                           sizes.s(j) * (sizes.r(i) + speed * sizes.s(i));
         ASSERT_LE(std::abs(skew(i, j)), 1e-12L * size) << n << " segments, trial " << k;
@@ -109,7 +110,7 @@ TEST_P(Laws, InertiaRateMinusTwiceCoriolisIsSkew) {
 
 TEST_P(Laws, CoriolisMatrixIsLinearInTheVelocity) {
   for_hard_arms([](const ArmParameters& arm, State s, RandomArm& random) {
-    const Eigen::VectorXd v = s.v, w = random.vector(arm.dof(), 3.0);
+    const Eigen::VectorXd v = s.v, w = random.state(arm, 0.0, 3.0).v;
     const auto C = [&](const Eigen::VectorXd& velocity) {
       s.v = velocity;
       return evaluate(arm, s).C;
@@ -120,7 +121,7 @@ TEST_P(Laws, CoriolisMatrixIsLinearInTheVelocity) {
     const auto sizes = reference::dynamics(arm, s.u.cast<Real>(), v.cast<Real>());
     const auto other = reference::dynamics(arm, s.u.cast<Real>(), w.cast<Real>());
     const Eigen::MatrixXd sum = C(v + w) - C(v) - C(w);
-    const Real speed = v.cwiseAbs().maxCoeff() + w.cwiseAbs().maxCoeff();
+    const Real speed = largest_rate(arm, s.u, v) + largest_rate(arm, s.u, w);
     for (int i = 0; i < arm.dof(); ++i) {
       for (int j = 0; j < arm.dof(); ++j) {
         const Real size = sizes.s(i) * (sizes.r(j) + other.r(j) + speed * sizes.s(j));
@@ -134,7 +135,7 @@ TEST_P(Laws, VelocityProductIsBilinearAndSymmetric) {
   for_hard_arms([](const ArmParameters& arm, const State& s, RandomArm& random) {
     const int dof = arm.dof();
     DynamicsWorkspace workspace(arm);
-    const Eigen::VectorXd w = random.vector(dof, 3.0), x = random.vector(dof, 3.0);
+    const Eigen::VectorXd w = random.state(arm, 0.0, 3.0).v, x = random.state(arm, 0.0, 3.0).v;
     const auto product = [&](const Eigen::VectorXd& a, const Eigen::VectorXd& b) {
       Eigen::VectorXd out(dof);
       inverse_dynamics(arm, workspace, s.u, a, b, s.a,
@@ -146,7 +147,7 @@ TEST_P(Laws, VelocityProductIsBilinearAndSymmetric) {
     const Eigen::VectorXd sum = product(s.v, w + x) - product(s.v, w) - product(s.v, x);
     const auto sizes = reference::dynamics(arm, s.u.cast<Real>(), s.v.cast<Real>());
     Real along = 0;
-    const Real speed = s.v.cwiseAbs().maxCoeff();
+    const Real speed = largest_rate(arm, s.u, s.v);
     for (int j = 0; j < dof; ++j) {
       along += (sizes.r(j) + speed * sizes.s(j)) * Real(std::abs(w(j)) + std::abs(x(j)));
     }
@@ -164,7 +165,7 @@ TEST_P(Laws, EnergyChangesByThePowerPutIn) {
   for (int k = 0; k < 60; ++k) {
     const int n = 1 + k % 6;
     const ArmParameters arm = random.arm(n, GetParam(), k % 2 == 0 ? 30.0 : 3.0);
-    const State s = random.state(n, 6.5);
+    const State s = random.state(arm, 6.5);
     DynamicsWorkspace workspace(arm);
     Eigen::VectorXd acceleration(arm.dof());
     const Eigen::VectorXd tau = random.vector(arm.dof(), 0.5);
@@ -172,25 +173,23 @@ TEST_P(Laws, EnergyChangesByThePowerPutIn) {
     const Vector u = s.u.cast<Real>(), v = s.v.cast<Real>(), a = acceleration.cast<Real>();
     const auto energy = [&](Real t) {
       const auto at = reference::dynamics(arm, u + t * v + t * t / 2 * a, v + t * a);
-      Real elastic = 0;
-      for (int i = 0; i < arm.dof(); ++i) {
-        const Real bend = u(i) + t * v(i) + t * t / 2 * a(i);
-        elastic +=
-            arm.segments[static_cast<std::size_t>(i / 2)].stiffness_nm_per_rad * bend * bend / 2;
-      }
-      return at.kinetic_energy + at.gravity_potential + elastic;
+      const Vector q = u + t * v + t * t / 2 * a;
+      const Vector elastic = reference::impedance(arm, q, Vector::Zero(arm.dof()));
+      return at.kinetic_energy + at.gravity_potential + q.dot(elastic) / 2;
     };
-    // A time in which neither u nor u' changes by more than a thousandth of its size.
-    const Real h = 1e-3L / (1 + v.norm() + a.norm() / v.norm());
+    // A time in which no segment's shape changes by more than a few ten thousandths.
+    const Real h = 3e-4L / (1 + largest_rate(arm, u, v) + std::sqrt(largest_rate(arm, u, a)));
     const Real slope = (8 * (energy(h) - energy(-h)) - (energy(2 * h) - energy(-2 * h))) / (12 * h);
     Real power = 0, size = 0;
     const auto terms = reference::dynamics(arm, u, v);
+    const Vector zero = Vector::Zero(arm.dof());
+    const Vector damping = reference::impedance(arm, zero, v);
+    const Vector elastic = reference::impedance(arm, u, zero);
     for (int i = 0; i < arm.dof(); ++i) {
-      const auto& segment = arm.segments[static_cast<std::size_t>(i / 2)];
-      power += v(i) * (tau(i) - segment.damping_nms_per_rad * v(i));
+      power += v(i) * (tau(i) - damping(i));
       size += std::abs(v(i)) *
               (terms.s(i) * (terms.s.dot(a.cwiseAbs()) + terms.r.dot(v.cwiseAbs()) + terms.w) +
-               segment.stiffness_nm_per_rad * std::abs(u(i)));
+               std::abs(elastic(i)));
     }
     EXPECT_LE(std::abs(slope - power), 1e-10L * size) << n << " segments, trial " << k;
   }
@@ -200,16 +199,20 @@ TEST_P(Laws, NothingStepsWhereTheFormulaChanges) {
   RandomArm random(5);
   for (const double limit : {1.0, kArcSeriesLimit, kSeriesLimit, kHighSeriesLimit, 64.0}) {
     const ArmParameters arm = random.arm(3, GetParam());
-    State below = random.state(3, 1.0), above = below;
+    State below = random.state(arm, 1.0), above = below;
     // u along x: s = u_x^2 is the first double below the limit, or not below it.
     double theta = std::sqrt(limit);
     while (theta * theta >= limit) theta = std::nextafter(theta, 0.0);
     const double other = std::nextafter(theta, 100.0);
     ASSERT_GE(other * other, limit);
-    below.u << theta, 0.0, 0.0, -theta, theta, 0.0;
-    above.u << other, 0.0, 0.0, -other, other, 0.0;
+    for (int i = 0; i < 3; ++i) {
+      const auto bend = Eigen::seqN(arm.segment_dof() * i, 2);
+      const Eigen::Vector2d direction = i == 1 ? Eigen::Vector2d(0, -1) : Eigen::Vector2d(1, 0);
+      below.u(bend) = theta * direction;
+      above.u(bend) = other * direction;
+    }
     const Matrices a = evaluate(arm, below), b = evaluate(arm, above);
-    const double speed = below.v.cwiseAbs().maxCoeff();
+    const double speed = largest_rate(arm, below.u, below.v);
     const Eigen::VectorXd s = a.B.diagonal().cwiseSqrt();
     const Eigen::MatrixXd size = s * s.transpose();
     const double unit = std::numeric_limits<double>::epsilon() * (1.0 + limit);
@@ -223,11 +226,8 @@ TEST_P(Laws, NothingStepsWhereTheFormulaChanges) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(MassModels, Laws,
-                         ::testing::Values(MassModel::point, MassModel::distributed),
-                         [](const auto& mass) {
-                           return mass.param == MassModel::point ? "point" : "distributed";
-                         });
+INSTANTIATE_TEST_SUITE_P(ArmKinds, Laws, ::testing::ValuesIn(testing_support::kArmKinds),
+                         [](const auto& kind) { return name(kind.param); });
 
 }  // namespace
 }  // namespace softarm

@@ -26,22 +26,28 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 using Outputs = std::vector<Eigen::MatrixXd>;
 
+/// What a function does with arms that stretch; the angular Jacobian ignores e.
+enum class Elongation { unsupported, ignored, read };
+
 /// A function of u, u', and a third vector (an acceleration, a force), and which of them it reads.
 struct Function {
   std::string name;
   bool reads[3];
+  Elongation elongation;
   std::function<Outputs(const ArmParameters&, const State&)> call;
 };
 
 Outputs pose_of(const Eigen::Isometry3d& pose) { return {pose.matrix().topRows<3>()}; }
 
-std::vector<Function> functions() {
+std::vector<Function> all_functions() {
   return {
       {"tip_pose",
        {true, false, false},
+       Elongation::read,
        [](const auto& arm, const auto& s) { return pose_of(tip_pose(arm, s.u)); }},
       {"forward_kinematics",
        {true, false, false},
+       Elongation::read,
        [](const auto& arm, const auto& s) {
          std::vector<Eigen::Isometry3d> ends(static_cast<std::size_t>(arm.size()));
          forward_kinematics(arm, s.u, ends);
@@ -49,6 +55,7 @@ std::vector<Function> functions() {
        }},
       {"mass_centres",
        {true, false, false},
+       Elongation::read,
        [](const auto& arm, const auto& s) {
          Eigen::Matrix3Xd centres(3, arm.size());
          mass_centres(arm, s.u, centres);
@@ -56,6 +63,7 @@ std::vector<Function> functions() {
        }},
       {"tip_jacobians",
        {true, true, false},
+       Elongation::read,
        [](const auto& arm, const auto& s) {
          Eigen::Matrix3Xd J(3, arm.dof()), rate(3, arm.dof());
          tip_jacobians(arm, s.u, s.v, J, rate);
@@ -63,6 +71,7 @@ std::vector<Function> functions() {
        }},
       {"tip_angular_jacobian",
        {true, false, false},
+       Elongation::ignored,
        [](const auto& arm, const auto& s) {
          Eigen::Matrix3Xd J(3, arm.dof());
          tip_angular_jacobian(arm, s.u, J);
@@ -70,6 +79,7 @@ std::vector<Function> functions() {
        }},
       {"inverse_dynamics",
        {true, true, true},
+       Elongation::read,
        [](const auto& arm, const auto& s) {
          DynamicsWorkspace workspace(arm);
          Eigen::VectorXd out(arm.dof());
@@ -78,6 +88,7 @@ std::vector<Function> functions() {
        }},
       {"dynamics_matrices",
        {true, true, false},
+       Elongation::read,
        [](const auto& arm, const auto& s) {
          DynamicsWorkspace workspace(arm);
          Eigen::MatrixXd B(arm.dof(), arm.dof()), C = B;
@@ -87,6 +98,7 @@ std::vector<Function> functions() {
        }},
       {"forward_dynamics",
        {true, true, true},
+       Elongation::read,
        [](const auto& arm, const auto& s) {
          DynamicsWorkspace workspace(arm);
          Eigen::VectorXd out = Eigen::VectorXd::Zero(arm.dof());
@@ -95,17 +107,20 @@ std::vector<Function> functions() {
        }},
       {"kinetic_energy",
        {true, true, false},
+       Elongation::read,
        [](const auto& arm, const auto& s) {
          DynamicsWorkspace workspace(arm);
          return Outputs{Eigen::MatrixXd::Constant(1, 1, kinetic_energy(arm, workspace, s.u, s.v))};
        }},
       {"gravity_potential",
        {true, false, false},
+       Elongation::read,
        [](const auto& arm, const auto& s) {
          return Outputs{Eigen::MatrixXd::Constant(1, 1, gravity_potential(arm, s.u))};
        }},
       {"add_tip_force",
        {true, false, false},
+       Elongation::read,
        [](const auto& arm, const auto& s) {
          Eigen::VectorXd out = Eigen::VectorXd::Zero(arm.dof());
          add_tip_force(arm, s.u, {0.3, 0.2, -0.4}, out);
@@ -113,6 +128,7 @@ std::vector<Function> functions() {
        }},
       {"solve_actuation",
        {true, false, true},
+       Elongation::unsupported,
        [](ArmParameters arm, const auto& s) {
          arm.actuation = ActuationModel::couple;
          Eigen::VectorXd out(arm.dof());
@@ -121,6 +137,7 @@ std::vector<Function> functions() {
        }},
       {"u_to_polar",
        {true, false, false},
+       Elongation::unsupported,
        [](const auto&, const auto& s) {
          Eigen::VectorXd q(s.u.size());
          u_to_polar(s.u, q);
@@ -128,6 +145,7 @@ std::vector<Function> functions() {
        }},
       {"polar_dynamics_matrices",
        {true, true, false},
+       Elongation::unsupported,
        [](const auto& arm, const auto& s) {
          DynamicsWorkspace workspace(arm);
          Eigen::MatrixXd B(arm.dof(), arm.dof()), C = B;
@@ -137,6 +155,7 @@ std::vector<Function> functions() {
        }},
       {"polar route",
        {true, true, true},
+       Elongation::unsupported,
        [](const auto& arm, const auto& s) {  // s.u is q here
          Eigen::VectorXd u(s.u.size()), v = u, a = u;
          polar_to_u(s.u, u);
@@ -150,6 +169,7 @@ std::vector<Function> functions() {
        }},
       {"controller",
        {true, true, true},
+       Elongation::unsupported,
        [](const auto& arm, const auto& s) {
          ControllerSettings settings;
          settings.kp.assign(static_cast<std::size_t>(arm.dof()), 1.0);
@@ -166,6 +186,15 @@ std::vector<Function> functions() {
   };
 }
 
+/// Those of the arm's kind.
+std::vector<Function> functions(bool extensible) {
+  std::vector<Function> result;
+  for (const Function& f : all_functions()) {
+    if (f.elongation != Elongation::unsupported || !extensible) result.push_back(f);
+  }
+  return result;
+}
+
 bool any_nan(const Outputs& outputs) {
   for (const auto& matrix : outputs) {
     if (matrix.array().isNaN().any()) return true;
@@ -173,18 +202,20 @@ bool any_nan(const Outputs& outputs) {
   return false;
 }
 
-class NotFinite : public ::testing::TestWithParam<MassModel> {};
+class NotFinite : public ::testing::TestWithParam<testing_support::ArmKind> {};
 
 TEST_P(NotFinite, InAnyInputGivesNanOut) {
   RandomArm random(1);
   for (const int n : {1, 2, 3, 4, 6, 9}) {
     const ArmParameters arm = random.arm(n, GetParam());
-    const State good = random.state(n, 5.0);
-    for (const Function& f : functions()) {
+    const State good = random.state(arm, 5.0);
+    for (const Function& f : functions(GetParam().extensible)) {
       ASSERT_FALSE(any_nan(f.call(arm, good))) << f.name;
       for (int which = 0; which < 3; ++which) {
         if (!f.reads[which]) continue;
         for (int k = 0; k < arm.dof(); ++k) {
+          const bool is_elongation = arm.extensible && k % 3 == 2;
+          if (is_elongation && f.elongation == Elongation::ignored) continue;
           for (const double poison : {kNan, -kNan, kInfinity, -kInfinity}) {
             State bad = good;
             (which == 0 ? bad.u : which == 1 ? bad.v : bad.a)(k) = poison;
@@ -212,8 +243,8 @@ TEST_P(NotFinite, ParametersGiveNanOut) {
       if (which == 1) arm.segments[1].mass_kg = poison;
       if (which == 2) arm.gravity_mps2.x() = poison;
       DynamicsWorkspace workspace(arm);
-      const State s = random.state(3, 3.0);
-      Eigen::VectorXd out(6);
+      const State s = random.state(arm, 3.0);
+      Eigen::VectorXd out(arm.dof());
       inverse_dynamics(arm, workspace, s.u, s.v, s.v, s.a, {}, out);
       EXPECT_FALSE(out.allFinite());
       out.setZero();
@@ -227,9 +258,9 @@ TEST_P(NotFinite, SolverSaysNo) {
   RandomArm random(3);
   const ArmParameters arm = random.arm(3, GetParam());
   DynamicsWorkspace workspace(arm);
-  State s = random.state(3, 3.0);
+  State s = random.state(arm, 3.0);
   s.u(2) = kNan;
-  Eigen::VectorXd out = Eigen::VectorXd::Zero(6);
+  Eigen::VectorXd out = Eigen::VectorXd::Zero(arm.dof());
   EXPECT_FALSE(forward_dynamics(arm, workspace, s.u, s.v, s.a, out));
   EXPECT_TRUE(out.array().isNaN().all());
 }
@@ -239,9 +270,9 @@ TEST_P(NotFinite, HugeBendingReturns) {
   for (const double theta : {20.0, 1e2, 1e4, 1e8, 1e15, 1e100, 1e154, 1e160, 1e300, 1.7e308}) {
     for (const int n : {1, 3, 5}) {
       const ArmParameters arm = random.arm(n, GetParam());
-      State s = random.state(n, 3.0);
-      s.u.tail<2>() << 0.6 * theta, -0.8 * theta;
-      for (const Function& f : functions()) {
+      State s = random.state(arm, 3.0);
+      s.u.segment<2>(arm.segment_dof() * (n - 1)) << 0.6 * theta, -0.8 * theta;
+      for (const Function& f : functions(GetParam().extensible)) {
         // Finite where the square does not overflow, NaN where it does.
         const Outputs got = f.call(arm, s);
         bool finite = true;
@@ -255,11 +286,8 @@ TEST_P(NotFinite, HugeBendingReturns) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(MassModels, NotFinite,
-                         ::testing::Values(MassModel::point, MassModel::distributed),
-                         [](const auto& mass) {
-                           return mass.param == MassModel::point ? "point" : "distributed";
-                         });
+INSTANTIATE_TEST_SUITE_P(ArmKinds, NotFinite, ::testing::ValuesIn(testing_support::kArmKinds),
+                         [](const auto& kind) { return name(kind.param); });
 
 }  // namespace
 }  // namespace softarm

@@ -23,12 +23,12 @@ struct Batch {
   int segments, states;
 };
 
-/// 50 300 states; both mass models make 1e5 and some.
+/// 50 300 states of each kind of arm; both mass models make 1e5 and some, stretching arms as many.
 constexpr Batch kBatches[] = {{1, 14000}, {2, 12000}, {3, 12000}, {4, 6000}, {5, 3000},
                               {6, 2000},  {8, 800},   {10, 300},  {16, 120}, {24, 40},
                               {32, 20},   {48, 12},   {64, 8}};
 
-class RandomStates : public ::testing::TestWithParam<MassModel> {};
+class RandomStates : public ::testing::TestWithParam<testing_support::ArmKind> {};
 
 TEST_P(RandomStates, AgreeWithLongDouble) {
   int states = 0;
@@ -38,10 +38,8 @@ TEST_P(RandomStates, AgreeWithLongDouble) {
       const int n = batch.segments;
       const double theta = n > 10 ? 3.2 : k % 2 == 0 ? 7.0 : 1.6;
       const ArmParameters arm = random.arm(n, GetParam(), k % 4 == 0 ? 100.0 : 3.0);
-      // Point masses of long arms have no B to divide by in double: every segment costs a digit.
-      const bool solvable = n <= 6 || GetParam() == MassModel::distributed;
-      expect_within(AgainstReference(arm, random.state(n, theta, k % 8 == 0 ? 1e3 : 2.0), solvable),
-                    n, theta);
+      expect_within(AgainstReference(arm, random.state(arm, theta, k % 8 == 0 ? 1e3 : 2.0)), n,
+                    theta);
       if (HasFailure()) FAIL() << n << " segments, state " << k;
     }
   }
@@ -50,11 +48,11 @@ TEST_P(RandomStates, AgreeWithLongDouble) {
 
 TEST(ThickArms, AgreeWithLongDouble) {
   RandomArm random(7);
-  for (int k = 0; k < 2000; ++k) {
+  for (int k = 0; k < 4000; ++k) {
     const int n = 1 + k % 6;
     const double theta = k % 2 == 0 ? 7.0 : 1.6;
-    const ArmParameters arm = random.thick(random.arm(n, MassModel::distributed));
-    expect_within(AgainstReference(arm, random.state(n, theta)), n, theta);
+    const ArmParameters arm = random.thick(random.arm(n, {MassModel::distributed, k >= 2000}));
+    expect_within(AgainstReference(arm, random.state(arm, theta)), n, theta);
     if (HasFailure()) FAIL() << n << " segments, state " << k;
   }
 }
@@ -65,7 +63,7 @@ TEST_P(RandomStates, AgreeForRatiosOfAMillion) {
     for (int k = 0; k < (n < 10 ? 150 : 3); ++k) {
       const ArmParameters arm = random.arm(n, GetParam(), 1e6);
       const double theta = n > 10 ? 3.2 : 7.0;
-      expect_within(AgainstReference(arm, random.state(n, theta), false), n, theta);
+      expect_within(AgainstReference(arm, random.state(arm, theta), false), n, theta);
       if (HasFailure()) FAIL() << n << " segments, state " << k;
     }
   }
@@ -83,16 +81,13 @@ TEST_P(RandomStates, AgreeWhereNeighboursDifferByAMillion) {
       if (k % 3 != 1) s.mass_kg *= 1e6;
       s.stiffness_nm_per_rad *= 1e-6;
     }
-    expect_within(AgainstReference(arm, random.state(n, 7.0), false), n, 7.0);
+    expect_within(AgainstReference(arm, random.state(arm, 7.0), false), n, 7.0);
     if (HasFailure()) FAIL() << n << " segments, state " << k;
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(MassModels, RandomStates,
-                         ::testing::Values(MassModel::point, MassModel::distributed),
-                         [](const auto& mass) {
-                           return mass.param == MassModel::point ? "point" : "distributed";
-                         });
+INSTANTIATE_TEST_SUITE_P(ArmKinds, RandomStates, ::testing::ValuesIn(testing_support::kArmKinds),
+                         [](const auto& kind) { return name(kind.param); });
 
 }  // namespace
 }  // namespace softarm

@@ -59,16 +59,16 @@ const std::vector<double>& special_angles() {
   return angles;
 }
 
-class SpecialAngles : public ::testing::TestWithParam<MassModel> {};
+class SpecialAngles : public ::testing::TestWithParam<testing_support::ArmKind> {};
 
 TEST_P(SpecialAngles, OfEverySegmentAtOnce) {
   RandomArm random(1);
   for (const double theta : special_angles()) {
     for (const double phi : {0.0, 0.3, 0.5 * kPi, kPi, -kPi, std::nextafter(kPi, 4.0), -2.0}) {
       const ArmParameters arm = random.arm(3, GetParam());
-      State s = random.state(3, 1.0, phi == 0.3 ? 1e3 : 2.0);
+      State s = random.state(arm, 1.0, phi == 0.3 ? 1e3 : 2.0);
       for (int i = 0; i < 3; ++i) {
-        s.u.segment<2>(2 * i) << theta * std::cos(phi), theta * std::sin(phi);
+        s.u.segment<2>(arm.segment_dof() * i) << theta * std::cos(phi), theta * std::sin(phi);
       }
       expect_within(AgainstReference(arm, s), 3, theta);
       if (HasFailure()) FAIL() << "theta " << theta << ", phi " << phi;
@@ -83,12 +83,13 @@ TEST_P(SpecialAngles, MixedAlongTheArm) {
   for (int trial = 0; trial < 400; ++trial) {
     const int n = 2 + trial % 6;
     const ArmParameters arm = random.arm(n, GetParam());
-    State s = random.state(n, 1.0, trial % 3 == 0 ? 1e3 : 2.0);
+    State s = random.state(arm, 1.0, trial % 3 == 0 ? 1e3 : 2.0);
     for (int i = 0; i < n; ++i) {
       const auto pick =
           static_cast<std::size_t>(random.uniform(0.0, 0.999) * double(angles.size()));
       const double phi = random.uniform(-4.0, 4.0);
-      s.u.segment<2>(2 * i) << angles[pick] * std::cos(phi), angles[pick] * std::sin(phi);
+      s.u.segment<2>(arm.segment_dof() * i) << angles[pick] * std::cos(phi),
+          angles[pick] * std::sin(phi);
     }
     expect_within(AgainstReference(arm, s), n, 7.0);
     if (HasFailure()) FAIL() << "trial " << trial;
@@ -99,16 +100,16 @@ TEST_P(SpecialAngles, SweptDensely) {
   // A switch that this file does not know would lie between two of these and show on one side.
   RandomArm random(3);
   const ArmParameters arm = random.arm(1, GetParam());
-  State s = random.state(1, 1.0);
+  State s = random.state(arm, 1.0);
   constexpr int kSteps = 15000;
   for (int k = 0; k <= kSteps; ++k) {
     const double theta = 7.5 * k / kSteps;
-    s.u << 0.6 * theta, -0.8 * theta;
+    s.u.head<2>() << 0.6 * theta, -0.8 * theta;
     expect_within(AgainstReference(arm, s), 1, theta);
     if (HasFailure()) FAIL() << "theta " << theta;
   }
   for (double theta = 1.0; theta > 0.0; theta *= 0.4) {  // down through the denormals
-    s.u << 0.6 * theta, -0.8 * theta;
+    s.u.head<2>() << 0.6 * theta, -0.8 * theta;
     expect_within(AgainstReference(arm, s), 1, theta);
     if (HasFailure()) FAIL() << "theta " << theta;
   }
@@ -119,16 +120,13 @@ TEST_P(SpecialAngles, RandomSpeedsUpToThousandRadiansPerSecond) {
   for (int trial = 0; trial < 500; ++trial) {
     const int n = 1 + trial % 5;
     const ArmParameters arm = random.arm(n, GetParam());
-    expect_within(AgainstReference(arm, random.state(n, 7.0, 1e3)), n, 7.0);
+    expect_within(AgainstReference(arm, random.state(arm, 7.0, 1e3)), n, 7.0);
     if (HasFailure()) FAIL() << "trial " << trial;
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(MassModels, SpecialAngles,
-                         ::testing::Values(MassModel::point, MassModel::distributed),
-                         [](const auto& mass) {
-                           return mass.param == MassModel::point ? "point" : "distributed";
-                         });
+INSTANTIATE_TEST_SUITE_P(ArmKinds, SpecialAngles, ::testing::ValuesIn(testing_support::kArmKinds),
+                         [](const auto& kind) { return name(kind.param); });
 
 TEST(EntireFunctions, AgreeWithLongDoubleEverywhere) {
   const auto expect_close = [](double s) {

@@ -146,7 +146,7 @@ TEST(LinksPlant, AreDrivenThroughPiWithoutNoticing) {
   EXPECT_GT(largest, 1.1 * std::numbers::pi);
 }
 
-TEST(LinksPlant, AFailureTellsTimeStateAndCause) {
+TEST(LinksPlant, AFailureStatesTimeStateAndCause) {
   PlantSettings settings = section_six();
   ArmPlant plant(settings);
   plant.advance(0.01);

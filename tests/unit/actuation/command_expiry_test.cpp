@@ -55,7 +55,7 @@ TEST_F(Expiry, OlderAndRepeatedSequencesNeitherActNorProlong) {
   EXPECT_TRUE(expiry.update(100 * kMs));
 }
 
-TEST_F(Expiry, ASenderMayStartAnewOnceTheArmIsVented) {
+TEST_F(Expiry, ASenderMayStartAgainOnceTheArmIsVented) {
   expiry.receive(command(1'000'000), 0);
   EXPECT_EQ(expiry.receive(command(0), 50 * kMs), CommandVerdict::older);
   EXPECT_EQ(expiry.receive(command(0), 100 * kMs), CommandVerdict::in_force);

@@ -26,7 +26,7 @@ TEST(KeyHold, RepeatsHoldAndTheirEndReleasesSooner) {
   }
   EXPECT_TRUE(hold.held(now_ns + 100 * kMs));
   EXPECT_FALSE(hold.held(now_ns + 300 * kMs));
-  // Pressed anew: the first repeat may again take long.
+  // Pressed again: the first repeat may again take long.
   hold.event(now_ns + 400 * kMs);
   EXPECT_TRUE(hold.held(now_ns + 1000 * kMs));
 }

@@ -82,9 +82,9 @@ TEST(Histogram, QuantilesEncloseThoseOfTheSortedDurations) {
   std::sort(all.begin(), all.end());
   for (const double fraction : {0.01, 0.5, 0.9, 0.99, 0.999}) {
     const double exact = all[static_cast<std::size_t>(fraction * 10'000) - 1];
-    const double told = quantile_us(histogram.counts(), fraction);
-    EXPECT_GE(told, exact) << fraction;
-    EXPECT_LE(told, std::max(std::sqrt(2.0), exact * std::sqrt(2.0) * (1 + 1e-9))) << fraction;
+    const double reported = quantile_us(histogram.counts(), fraction);
+    EXPECT_GE(reported, exact) << fraction;
+    EXPECT_LE(reported, std::max(std::sqrt(2.0), exact * std::sqrt(2.0) * (1 + 1e-9))) << fraction;
   }
 }
 
@@ -141,7 +141,7 @@ TEST(InstanceLock, ASecondHolderIsRefusedUntilTheFirstIsGone) {
 }
 
 // The kernel takes 107 bytes: names that begin alike, of two arms, must not exclude each other.
-TEST(InstanceLock, LongNamesAreToldApartByTheirEnds) {
+TEST(InstanceLock, LongNamesAreDistinguishedByTheirEnds) {
   const std::string begin = "test of " + std::to_string(monotonic_now_ns()) + std::string(200, 'x');
   for (const std::size_t length : {80, 98, 99, 100, 101, 150, 200}) {
     const std::string name = begin.substr(0, length);

@@ -53,7 +53,7 @@ TEST(LineLog, CountsWhatDoesNotFit) {
   EXPECT_EQ(terminal.lines.back(), "program: 7 lines came too fast to be printed\n");
 }
 
-TEST(LineLog, HasRoomAgainOnceLinesWerePrinted) {
+TEST(LineLog, TakesLinesAgainOnceSomeWerePrinted) {
   constexpr int kLines = static_cast<int>(LineLog::kCapacity);
   std::vector<std::string> lines;
   std::latch printed{kLines};

@@ -1,5 +1,5 @@
-// What the machine permits the tick's thread. Every case in a process of its own, which takes its
-// limits and locked pages away with it.
+// What the machine permits the tick's thread. Every case in a separate process, with which its
+// limits and locked pages end.
 #include "softarm/base/realtime.hpp"
 
 #include <gtest/gtest.h>
@@ -36,7 +36,7 @@ int in_a_child(const std::function<int()>& body) {
   return after.ru_minflt - before.ru_minflt;
 }
 
-TEST(Realtime, APriorityOneAboveTheLimitIsRefusedAndTold) {
+TEST(Realtime, APriorityOneAboveTheLimitIsRefusedAndReported) {
   const int code = in_a_child([] {
     // Root may do anything; nobody only what the limit permits, which may be nothing.
     rlimit limit{.rlim_cur = 49, .rlim_max = 49};
@@ -47,8 +47,8 @@ TEST(Realtime, APriorityOneAboveTheLimitIsRefusedAndTold) {
       return kNotPermitted;
     const auto refused = apply_realtime_settings({.fifo = true, .priority = permitted + 1});
     if (refused.size() != 1) return 1;
-    const std::string told = "priority " + std::to_string(permitted + 1);
-    return refused[0].find(told) != std::string::npos &&
+    const std::string wanted = "priority " + std::to_string(permitted + 1);
+    return refused[0].find(wanted) != std::string::npos &&
                    refused[0].find("LimitRTPRIO") != std::string::npos
                ? 0
                : 2;
@@ -59,7 +59,7 @@ TEST(Realtime, APriorityOneAboveTheLimitIsRefusedAndTold) {
 
 TEST(Realtime, LockedMemoryIncludesTheStackThatATickNeeds) {
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-  GTEST_SKIP() << "sanitizers keep stacks of their own";
+  GTEST_SKIP() << "sanitizers keep their own stacks";
 #endif
   EXPECT_GT(in_a_child([] { return static_cast<int>(std::min(faults_of_deep_stack(), 100L)); }), 20)
       << "200 KiB that are not there yet";
@@ -78,7 +78,7 @@ TEST(Realtime, SleepsEndWhenDueWithoutFifoToo) {
   EXPECT_EQ(slack_ns, 1);
 }
 
-TEST(Realtime, ACpuThatIsNotThereIsTold) {
+TEST(Realtime, ACpuThatIsNotThereIsReported) {
   const int lines =
       in_a_child([] { return static_cast<int>(apply_realtime_settings({.cpu = 1023}).size()); });
   EXPECT_EQ(lines, 1);

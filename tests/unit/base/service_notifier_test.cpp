@@ -1,4 +1,4 @@
-// What a service manager is told, with time as an argument and its socket in our hands.
+// What a service manager receives, with time as an argument and its socket in our hands.
 #include "softarm/base/service_notifier.hpp"
 
 #include <gtest/gtest.h>
@@ -42,14 +42,14 @@ TEST_P(Notifier, FeedsTheWatchdogOnlyWhileDeadlinesAreMet) {
   setenv("WATCHDOG_USEC", "100000", 1);
   setenv("WATCHDOG_PID", std::to_string(getpid()).c_str(), 1);
   ServiceNotifier notifier;
-  int told = 0;
+  int feeds = 0;
   const auto run = [&](int from_ms, int to_ms, bool on_time) {
-    told = 0;
+    feeds = 0;
     for (int t = from_ms; t < to_ms; t += 2) {
       notifier.report(kStart_ns + t * kMs, {.state = "ACTIVE", .reason = "", .on_time = on_time});
-      if (manager_.next().find("WATCHDOG=1") != std::string::npos) ++told;
+      if (manager_.next().find("WATCHDOG=1") != std::string::npos) ++feeds;
     }
-    return told;
+    return feeds;
   };
   EXPECT_EQ(run(0, 1000, true), 20) << "every 50 ms";
   EXPECT_EQ(run(1000, 2000, false), 0) << "no deadline was kept";
@@ -88,7 +88,7 @@ TEST_P(Notifier, DoesNotWaitForAManagerThatDoesNotRead) {
   }
   EXPECT_GT(queued, 0);
   EXPECT_LT(queued, 2000);
-  // What did not fit is told with the next report, and only the newest of it.
+  // What did not fit is sent with the next report, and only the newest of it.
   notifier.report(kStart_ns + 2001 * kMs, {.state = "VENT", .reason = "", .stopping = true});
   EXPECT_EQ(manager_.next(), "STOPPING=1\nSTATUS=VENT\nWATCHDOG=1\n");
 }
@@ -115,7 +115,7 @@ TEST(NotifierWithoutManager, DoesNothing) {
   EXPECT_EQ(notifier.problem(), "");
 }
 
-TEST(NotifierWithoutManager, TellsOfAnAddressThatIsNone) {
+TEST(NotifierWithoutManager, ReportsAnInvalidAddress) {
   const std::string relative = "run/notify", too_long = std::string("/").append(200, 'x');
   for (const std::string& address : {relative, too_long}) {
     setenv("NOTIFY_SOCKET", address.c_str(), 1);

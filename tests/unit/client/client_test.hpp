@@ -1,13 +1,13 @@
-// A client on a port of the test's own, and somebody on the other side of the wire.
+// A client on a port of the test, and its peer on the other side of the wire.
 #pragma once
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <memory>
 #include <string>
 #include <vector>
 
+#include "own_url.hpp"
 #include "softarm/client/arm_client.hpp"
 #include "softarm/config/load.hpp"
 #include "softarm/transport/message_decoding.hpp"
@@ -20,8 +20,7 @@ inline constexpr double kPatience_s = 20.0;  ///< for what comes at once, on a m
 class ClientTest : public ::testing::Test {
  protected:
   ClientTest() {
-    experiment.transport.lcm.url =
-        "udpm://239.255.76.67:" + std::to_string(20000 + getpid() % 12000) + "?ttl=0";
+    experiment.transport.lcm.url = own_url();
     experiment.transport.lcm.deadman_channel = "SOFTARM_GO";
     experiment.actuation.max_pressure_bar = 1.5;
     experiment.actuation.slew_bar_per_s = 4.0;

@@ -1,9 +1,10 @@
-// What a client makes of messages on a real socket: typed, of this arm, nobody's shadow.
+// What a client makes of messages on a real socket: typed, of this arm, not of a shadow.
 #include <filesystem>
 #include <fstream>
 #include <stdexcept>
 
 #include "softarm/transport/mocap_source.hpp"
+#include "test_folder.hpp"
 #include "unit/client/arcs.hpp"
 #include "unit/client/client_test.hpp"
 
@@ -138,8 +139,8 @@ TEST_F(Listening, WhatACallbackThrowsReachesTheCallerAndEndsNothing) {
 }
 
 TEST_F(Listening, WhatIsRecordedIsReadAgain) {
-  const auto path =
-      std::filesystem::temp_directory_path() / ("softarm_client_log_" + std::to_string(getpid()));
+  const TestFolder folder;
+  const auto path = folder / "log";
   client->record(path);
   std::vector<std::pair<std::string, test::Bytes>> sent;
   const auto send = [&](const std::string& channel, const auto& message) {
@@ -174,7 +175,6 @@ TEST_F(Listening, WhatIsRecordedIsReadAgain) {
   }
   EXPECT_FALSE(log.next(event)) << "not after stop_recording";
   EXPECT_EQ(log.damage_count(), 0);
-  std::filesystem::remove(path);
 }
 
 TEST_F(Listening, ARecordThatCannotBeWrittenSaysSo) {

@@ -1,4 +1,4 @@
-// What a tool plays on an arm ends with the first thing that goes wrong, and says what it was.
+// What a tool plays on an arm ends with the first fault, and reports it.
 #include "commissioning/guarded_motion.hpp"
 
 #include <functional>

@@ -1,4 +1,4 @@
-// A corpus of bad files: each is the good one with a single line spoilt, and must be refused at
+// A corpus of bad files: each is the good one with a single line corrupted, and must be refused at
 // that line and key.
 #include <algorithm>
 #include <vector>
@@ -9,7 +9,7 @@
 namespace softarm {
 namespace {
 
-struct Spoilt {
+struct BadLine {
   const char* good;      ///< occurs once in the good file
   const char* bad;       ///< what stands there instead
   const char* key;       ///< that must be blamed
@@ -18,9 +18,9 @@ struct Spoilt {
       nullptr;  ///< the text in whose line the fault lies; the replacement where not given
 };
 
-void PrintTo(const Spoilt& spoilt, std::ostream* out) { *out << spoilt.bad; }
+void PrintTo(const BadLine& line, std::ostream* out) { *out << line.bad; }
 
-const Spoilt kSpoilt[] = {
+const BadLine kBadLines[] = {
     // unknown, with a hint where there is one
     {"seed: 7", "sead: 7", "sead", "did you mean seed"},
     {"  mass_kg: 0.15", "  mass_kgs: 0.15", "arm.mass_kgs", "did you mean mass_kg"},
@@ -139,9 +139,8 @@ const Spoilt kSpoilt[] = {
     {"[0, pi/2, pi, 3*pi/2]", "[0, pi]", "actuation.chambers", "at least 3 chambers", "chambers:"},
     {"[0, pi/2, pi, 3*pi/2]", "[0, 0.5, 1]", "actuation.chambers", "every direction", "chambers:"},
     // not YAML as we take it
-    {"  mass_kg: 0.15", "  mass_kg: [0.15", "", "valid YAML", "stiffness_nm_per_rad"},
+    {"  mass_kg: 0.15", "  mass_kg: [0.15", "arm.mass_kg", "a closing bracket"},
     {"  mass_kg: 0.15", "  mass_kg: !!float 0.15", "arm.mass_kg", "no tags"},
-    {"  mass_kg: 0.15", "  mass_kg: &mass 0.15", "arm.mass_kg", "no anchors"},
     {"  mass_kg: 0.15", "  ? [mass_kg]\n  : 0.15", "arm", "a word as key", "[mass_kg]"},
 };
 
@@ -150,17 +149,17 @@ int line_of(const std::string& text, std::size_t offset) {
                                          text.begin() + static_cast<std::ptrdiff_t>(offset), '\n'));
 }
 
-class BadFile : public testing::TestWithParam<Spoilt> {};
+class BadFile : public testing::TestWithParam<BadLine> {};
 
 TEST_P(BadFile, IsRefusedWithFileLineAndKey) {
-  const Spoilt& spoilt = GetParam();
+  const BadLine& line = GetParam();
   std::string text = kGoodExperiment;
-  const std::size_t offset = text.find(spoilt.good);
-  ASSERT_NE(offset, std::string::npos) << spoilt.good;
-  ASSERT_EQ(text.find(spoilt.good, offset + 1), std::string::npos) << "twice: " << spoilt.good;
-  text.replace(offset, std::string(spoilt.good).size(), spoilt.bad);
-  const std::size_t fault = spoilt.at == nullptr ? offset : text.find(spoilt.at);
-  ASSERT_NE(fault, std::string::npos) << spoilt.at;
+  const std::size_t offset = text.find(line.good);
+  ASSERT_NE(offset, std::string::npos) << line.good;
+  ASSERT_EQ(text.find(line.good, offset + 1), std::string::npos) << "twice: " << line.good;
+  text.replace(offset, std::string(line.good).size(), line.bad);
+  const std::size_t fault = line.at == nullptr ? offset : text.find(line.at);
+  ASSERT_NE(fault, std::string::npos) << line.at;
 
   const TestFolder folder;
   const auto file = folder.write("bad.yaml", text);
@@ -170,14 +169,14 @@ TEST_P(BadFile, IsRefusedWithFileLineAndKey) {
   } catch (const ConfigError& error) {
     EXPECT_EQ(error.file, file.string());
     EXPECT_EQ(error.line, line_of(text, fault)) << error.what();
-    EXPECT_EQ(error.key, spoilt.key) << error.what();
-    EXPECT_NE(std::string(error.what()).find(spoilt.evidence), std::string::npos) << error.what();
+    EXPECT_EQ(error.key, line.key) << error.what();
+    EXPECT_NE(std::string(error.what()).find(line.evidence), std::string::npos) << error.what();
     EXPECT_EQ(
         std::string(error.what()).find(file.string() + ":" + std::to_string(error.line) + ": "), 0u)
         << error.what();
   }
 }
-INSTANTIATE_TEST_SUITE_P(Corpus, BadFile, testing::ValuesIn(kSpoilt));
+INSTANTIATE_TEST_SUITE_P(Corpus, BadFile, testing::ValuesIn(kBadLines));
 
 TEST(GoodFile, IsAccepted) {
   const TestFolder folder;

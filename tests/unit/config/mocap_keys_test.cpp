@@ -1,4 +1,4 @@
-// Who sends motion capture, and what the numbers mean.
+// Keys of the motion-capture source, and what its numbers mean.
 #include <gtest/gtest.h>
 
 #include "config_files.hpp"
@@ -40,8 +40,8 @@ TEST_F(MocapKeys, LeftOutMeanOurOwnFrames) {
   EXPECT_EQ(transport.mocap.quaternion, QuaternionOrder::wxyz);
   EXPECT_EQ(transport.mocap.axes, Eigen::Matrix3d::Identity());
   EXPECT_EQ(transport.lcm.mocap_channel, "SOFTARM_MOCAP");
-  ASSERT_EQ(transport.bodies.segment_plates.size(), 2U);
-  EXPECT_EQ(transport.bodies.segment_plates[1], MarkerFrameSettings{});
+  ASSERT_EQ(transport.bodies.segment_marker_frames.size(), 2U);
+  EXPECT_EQ(transport.bodies.segment_marker_frames[1], MarkerFrameSettings{});
 }
 
 TEST_F(MocapKeys, ASourceBringsItsDefaults) {
@@ -50,8 +50,9 @@ TEST_F(MocapKeys, ASourceBringsItsDefaults) {
   EXPECT_EQ(transport.mocap.quaternion, QuaternionOrder::xyzw);
   transport = load("  mocap: {source: rigid_transform}\n").transport;
   EXPECT_EQ(transport.mocap.quaternion, QuaternionOrder::wxyz);
-  EXPECT_EQ(body_channel(transport.lcm, transport.bodies.base_plate), "VICON_base");
-  EXPECT_EQ(body_channel(transport.lcm, transport.bodies.segment_plates[1]), "VICON_segment_2");
+  EXPECT_EQ(body_channel(transport.lcm, transport.bodies.base_marker_frame), "VICON_base");
+  EXPECT_EQ(body_channel(transport.lcm, transport.bodies.segment_marker_frames[1]),
+            "VICON_segment_2");
 }
 
 TEST_F(MocapKeys, EverythingCanBeSaidAndSurvivesPrinting) {
@@ -72,14 +73,15 @@ TEST_F(MocapKeys, EverythingCanBeSaidAndSurvivesPrinting) {
     // What is up there is up here.
     EXPECT_EQ(transport.mocap.axes * Eigen::Vector3d::UnitY(), Eigen::Vector3d::UnitZ());
     EXPECT_EQ(transport.mocap.axes * Eigen::Vector3d::UnitX(), Eigen::Vector3d::UnitX());
-    EXPECT_EQ(transport.bodies.base_plate.name, "root");
-    EXPECT_EQ(transport.bodies.base_plate.position_m, Eigen::Vector3d(0, 0.01, 0));
-    EXPECT_EQ(transport.bodies.segment_plates[0].rotation_rad.z(), 3.141592653589793);
-    EXPECT_EQ(transport.bodies.segment_plates[1].position_m, Eigen::Vector3d(1e-3, 2e-3, 3e-3));
+    EXPECT_EQ(transport.bodies.base_marker_frame.name, "root");
+    EXPECT_EQ(transport.bodies.base_marker_frame.position_m, Eigen::Vector3d(0, 0.01, 0));
+    EXPECT_EQ(transport.bodies.segment_marker_frames[0].rotation_rad.z(), 3.141592653589793);
+    EXPECT_EQ(transport.bodies.segment_marker_frames[1].position_m,
+              Eigen::Vector3d(1e-3, 2e-3, 3e-3));
   }
 }
 
-TEST_F(MocapKeys, MistakesAreTold) {
+TEST_F(MocapKeys, MistakesAreReported) {
   EXPECT_NE(complaint("  mocap: {source: vicon}\n").find("softarm, optitrack, rigid_transform"),
             std::string::npos);
   EXPECT_NE(complaint("  mocap: {unit: cm}\n").find("one of m, mm"), std::string::npos);
@@ -89,7 +91,7 @@ TEST_F(MocapKeys, MistakesAreTold) {
   EXPECT_NE(mirror.find("determinant -1"), std::string::npos) << mirror;
 }
 
-TEST_F(MocapKeys, EveryBodyHasAChannelOfItsOwn) {
+TEST_F(MocapKeys, EveryBodyHasItsOwnChannel) {
   std::string text = with_bodies("    segment_plates: [{name: a}, {name: a}]\n");
   text.replace(text.find("  bodies:"), 0, "  mocap: {source: rigid_transform}\n");
   try {

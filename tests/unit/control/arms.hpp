@@ -1,4 +1,4 @@
-// Arms, random numbers and a fine integrator for the tests of this room.
+// Arms, random numbers and a fine integrator for the tests of this module.
 #pragma once
 
 #include <Eigen/Core>

@@ -139,7 +139,7 @@ double track(const ControllerSettings& settings, double duration_s, double from_
   for (int tick = 0; tick < static_cast<int>(1000.0 * duration_s); ++tick) {
     const double t = 1e-3 * tick;
     reference.window(t + 0.5e-3, 0.0, window);
-    // The state at the middle of the period, as far as one derivative tells.
+    // The state at the middle of the period, as far as one derivative predicts it.
     const VectorXd ahead = state.head(dof) + 0.5e-3 * state.tail(dof);
     controller.compute(ahead, state.tail(dof), window, out);
     const VectorXd tau = out.tau_actuation_nm;

@@ -15,13 +15,13 @@ struct End {
 };
 
 /// `seconds` of the paper's arm at 1 kHz towards `target`, every segment's force bounded to
-/// `reach_nm` (as a box: enough to saturate), the controller believing in `believed`.
-End settle(const ArmParameters& believed, const ArmParameters& real, double ki, double reach_nm,
+/// `reach_nm` (as a box: enough to saturate), controlled with the model `modelled`.
+End settle(const ArmParameters& modelled, const ArmParameters& real, double ki, double reach_nm,
            const VectorXd& target, double seconds, CurvatureController* keep = nullptr) {
   const int dof = real.dof();
   ControllerSettings settings = test::gains(real.size(), 1.0, 0.002);
   settings.ki.assign(static_cast<std::size_t>(dof), ki);
-  CurvatureController own(believed, settings);
+  CurvatureController own(modelled, settings);
   CurvatureController& controller = keep != nullptr ? *keep : own;
   DynamicsWorkspace workspace(real);
   const VectorXd zero = VectorXd::Zero(dof);

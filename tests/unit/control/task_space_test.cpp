@@ -171,8 +171,8 @@ TEST(TaskSpace, TheTipOfAnExactArmIsOnThePathOnceItIsJoined) {
   }
 }
 
-/// A tip that is suddenly d off the model's is brought back as e'' + 2 L e' + L^2 e = -d'' - 2 L d'
-/// says when d is known at once: e = -d (1 - L t) exp(-L t) after the step.
+/// A tip that is suddenly d off the model's is brought back by e'' + 2 L e' + L^2 e = -d'' - 2 L d'
+/// with d known at once: e = -d (1 - L t) exp(-L t) after the step.
 TEST(TaskSpace, AnOffsetTipConvergesAtLambda) {
   const double lambda = 4.0;
   ControllerSettings control = settings(4, lambda, 300.0);
@@ -334,7 +334,7 @@ TEST(TaskSpace, PhasesOfBothKindsJoinSmoothly) {
   EXPECT_LT((before.u - Eigen::Map<const VectorXd>(pose.data(), 8)).norm(), 1e-12);
 }
 
-TEST(TaskSpace, StartsAnewAfterAStop) {
+TEST(TaskSpace, StartsAgainAfterAStop) {
   ExactArm arm(long_arm(), only(TipPathReference{}), settings(4, 10.0, 20.0));
   arm.start(VectorXd::Constant(8, 0.3));
   arm.run(3.0);

@@ -43,7 +43,7 @@ TEST(SoakReport, AHealthyRunIsNoFailure) {
 TEST(SoakReport, EveryBoundThatIsCrossedIsAFailureThatSaysWhy) {
   struct Row {
     const char* says;
-    std::function<void(SoakCounters&)> spoil;
+    std::function<void(SoakCounters&)> corrupt;
   };
   for (const Row& row : {
            Row{"memory grew by 513 KiB",
@@ -61,7 +61,7 @@ TEST(SoakReport, EveryBoundThatIsCrossedIsAFailureThatSaysWhy) {
                [](SoakCounters& c) { c.troubles.emplace_back("softarmd ended by itself"); }},
        }) {
     SoakCounters counters = healthy();
-    row.spoil(counters);
+    row.corrupt(counters);
     ASSERT_FALSE(failures(counters).empty()) << row.says;
     EXPECT_NE(failures(counters)[0].find(row.says), std::string::npos) << failures(counters)[0];
     EXPECT_NE(report_text(counters).find(std::string("FAILED: ") + failures(counters)[0]),
@@ -115,7 +115,7 @@ TEST(RandomReference, GoesThroughTheStraightPoseWithinItsBounds) {
   for (const int count : crossings) EXPECT_GT(count, 20);
 }
 
-TEST(SoakFaults, HaveNamesOfTheirOwnAndFaultsThatExist) {
+TEST(SoakFaults, HaveDistinctNamesAndFaultsThatExist) {
   std::set<std::string> names;
   for (const SoakFault& fault : soak_faults()) {
     EXPECT_TRUE(names.insert(fault.name).second) << fault.name;

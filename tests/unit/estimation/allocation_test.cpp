@@ -1,4 +1,4 @@
-// The whole room at work without a single allocation.
+// The whole module at work without a single allocation.
 #include <gtest/gtest.h>
 
 #include "counted_malloc.hpp"

@@ -42,10 +42,10 @@ TEST(ClockRelation, SeesThroughJitterAndDrift) {
     for (std::int64_t k = 0; k < 20'000; ++k) {  // 100 s at 200 Hz
       const std::int64_t captured = k * 5'000'000;
       const std::int64_t arrival = network.arrival_ns(captured);
-      const std::int64_t told = relation.capture_ns(arrival, network.stamp_us(captured));
-      ASSERT_LE(told, arrival);
+      const std::int64_t mapped_ns = relation.capture_ns(arrival, network.stamp_us(captured));
+      ASSERT_LE(mapped_ns, arrival);
       if (k >= 400)
-        worst_s = std::max(worst_s, 1e-9 * std::abs(static_cast<double>(told - captured)));
+        worst_s = std::max(worst_s, 1e-9 * std::abs(static_cast<double>(mapped_ns - captured)));
     }
     EXPECT_LT(worst_s, 0.25e-3) << "drift " << drift;
     EXPECT_EQ(relation.clock_jumps(), 0);
@@ -61,10 +61,10 @@ TEST(ClockRelation, AJumpOfTheSendersClockDoesNoHarm) {
       if (k == 2000) network.ahead_ns += to_ns(jump_s);
       const std::int64_t captured = k * 5'000'000;
       const std::int64_t arrival = network.arrival_ns(captured);
-      const std::int64_t told = relation.capture_ns(arrival, network.stamp_us(captured));
-      ASSERT_LE(told, arrival);
+      const std::int64_t mapped_ns = relation.capture_ns(arrival, network.stamp_us(captured));
+      ASSERT_LE(mapped_ns, arrival);
       if (k >= 400)
-        worst_s = std::max(worst_s, 1e-9 * std::abs(static_cast<double>(told - captured)));
+        worst_s = std::max(worst_s, 1e-9 * std::abs(static_cast<double>(mapped_ns - captured)));
     }
     // No worse than the jitter of the frame in which the clock jumped.
     EXPECT_LT(worst_s, 15e-3) << "jump " << jump_s;
@@ -85,15 +85,15 @@ TEST(ClockRelation, ForgetsWhatIsOlderThanTwoSeconds) {
   EXPECT_EQ(relation.capture_ns(1'000'000'000, 1'000'000), 1'000'000'000);
   // From now on the path takes 50 ms more; for two seconds that reads as lateness, then as the
   // least latency.
-  std::int64_t told = 0;
+  std::int64_t mapped_ns = 0;
   for (std::int64_t k = 1; k <= 30; ++k) {
-    told = relation.capture_ns(1'050'000'000 + k * 100'000'000, 1'000'000 + k * 100'000);
+    mapped_ns = relation.capture_ns(1'050'000'000 + k * 100'000'000, 1'000'000 + k * 100'000);
     const std::int64_t captured = 1'000'000'000 + k * 100'000'000;
     if (k < 17) {
-      EXPECT_EQ(told, captured) << k;
+      EXPECT_EQ(mapped_ns, captured) << k;
     }
   }
-  EXPECT_EQ(told, 1'050'000'000 + 30 * 100'000'000LL);
+  EXPECT_EQ(mapped_ns, 1'050'000'000 + 30 * 100'000'000LL);
   relation.reset();
   EXPECT_EQ(relation.capture_ns(9'000'000'000, 42), 9'000'000'000);
 }

@@ -298,11 +298,11 @@ TEST(CurvatureFilter, PredictsAnOccludedSegmentForAFewFramesOnly) {
   EXPECT_TRUE(motion.u_rad.tail<2>().isZero(0.0));
   const double u = next(true);
   EXPECT_TRUE(motion.all_valid());
-  EXPECT_DOUBLE_EQ(motion.u_rad[3], u);  // anew
+  EXPECT_DOUBLE_EQ(motion.u_rad[3], u);  // from rest again
   EXPECT_DOUBLE_EQ(motion.velocity_radps[3], 0.0);
 }
 
-TEST(CurvatureFilter, StartsAnewAfterALongGapAndBoundsItsPrediction) {
+TEST(CurvatureFilter, StartsAgainAfterALongGapAndBoundsItsPrediction) {
   CurvatureFilter filter(settings_of(), 1);
   FilteredMotion motion, later;
   for (int k = 0; k <= 200; ++k) filter.update(to_ns(0.005 * k), estimate_of(0.01 * k));

@@ -59,7 +59,7 @@ TEST_F(Validator, CountsNumbersRepeatedMissingAndOld) {
   EXPECT_EQ(validator.counters().missing, 3);
 }
 
-TEST_F(Validator, NoticesASenderThatBeganAnew) {
+TEST_F(Validator, NoticesASenderThatBeganAgain) {
   EXPECT_EQ(validator.accept(frame(5000)), FrameVerdict::accepted);
   u *= -1.0;  // meanwhile the arm has moved
   EXPECT_EQ(validator.accept(frame(0, 5001 * kPeriodNs)), FrameVerdict::sender_restarted);
@@ -69,7 +69,7 @@ TEST_F(Validator, NoticesASenderThatBeganAnew) {
   EXPECT_EQ(validator.counters().missing, 0);
 }
 
-TEST_F(Validator, NoticesASenderThatBeganAnewAfterFewFrames) {
+TEST_F(Validator, NoticesASenderThatBeganAgainAfterFewFrames) {
   for (int k = 0; k < 8; ++k) EXPECT_EQ(validator.accept(frame(k)), FrameVerdict::accepted);
   EXPECT_EQ(validator.accept(frame(0, 10 * kPeriodNs)), FrameVerdict::out_of_order);
   EXPECT_EQ(validator.accept(frame(1, 11 * kPeriodNs)), FrameVerdict::out_of_order);
@@ -188,7 +188,7 @@ TEST_F(Validator, AnUnseenBodyIsNoFaultOfTheFrame) {
   EXPECT_EQ(validator.counters().not_seen, 1);
 }
 
-TEST_F(Validator, TellsIdenticalPoses) {
+TEST_F(Validator, DetectsIdenticalPoses) {
   validator.accept(frame(1));
   EXPECT_EQ(validator.identical_in_row(), 0);
   validator.accept(frame(2));

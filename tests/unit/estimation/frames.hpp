@@ -1,4 +1,4 @@
-// Frames of PCC arms for the tests of this room, made by rotating about the bending axis: another
+// Frames of PCC arms for the tests of this module, made by rotating about the bending axis: another
 // route than the estimator's quaternion components.
 #pragma once
 

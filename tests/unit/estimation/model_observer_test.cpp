@@ -61,7 +61,7 @@ struct Station {
     while (!flying.empty() && flying.front().first.capture_ns + latency_ns <= now_ns) {
       auto [frame, reference] = flying.front();
       flying.erase(flying.begin());
-      if (spoil && !spoil(frame)) continue;
+      if (corrupt && !corrupt(frame)) continue;
       CurvatureEstimate estimate;
       estimator.estimate(frame, estimate);
       observer.update(frame, estimate, learns ? &reference : nullptr, learns);
@@ -88,7 +88,7 @@ struct Station {
   std::int64_t now_ns = 0, number = 1, latency_ns = 5 * kMs;
   std::vector<std::pair<MocapFrame, KnownMotion>> flying;
   FilteredMotion predicted;
-  std::function<bool(MocapFrame&)> spoil;
+  std::function<bool(MocapFrame&)> corrupt;
   std::function<void()> each_frame, each_tick;
 };
 
@@ -309,7 +309,7 @@ TEST(ModelObserver, PredictsAnOccludedSegmentForSoManyFrames) {
   Station station(arm, arm, settings);
   station.run(1.0);
   int hidden = 0;
-  station.spoil = [&](MocapFrame& frame) {
+  station.corrupt = [&](MocapFrame& frame) {
     frame.body[2].valid = false;  // bounds segments 2 and 3
     ++hidden;
     return true;
@@ -323,7 +323,7 @@ TEST(ModelObserver, PredictsAnOccludedSegmentForSoManyFrames) {
   station.run(0.1);
   EXPECT_GT(hidden, 15);
   EXPECT_LT(worst, 8e-3);
-  station.spoil = nullptr;
+  station.corrupt = nullptr;
   station.each_tick = nullptr;
   station.run(0.1);
   EXPECT_TRUE(station.predicted.all_valid());
@@ -335,7 +335,7 @@ TEST(ModelObserver, LivesThroughSilenceAndStartsAgainAfterASecond) {
   station.run(1.0);
   FilteredMotion before, after;
   station.observer.deviation(before);
-  station.spoil = [](MocapFrame&) { return false; };
+  station.corrupt = [](MocapFrame&) { return false; };
   double worst = 0.0;
   station.each_tick = [&] {
     worst = std::max(worst, (station.predicted.u_rad - station.truth.u).cwiseAbs().maxCoeff());
@@ -345,7 +345,7 @@ TEST(ModelObserver, LivesThroughSilenceAndStartsAgainAfterASecond) {
   EXPECT_LT(worst, 0.01);
   EXPECT_GT(after.u_rad[0], before.u_rad[0]);
   station.run(0.9);
-  station.spoil = nullptr;
+  station.corrupt = nullptr;
   station.run(1.0);
   EXPECT_TRUE(station.observer.running());
   EXPECT_LT((station.predicted.u_rad - station.truth.u).cwiseAbs().maxCoeff(), 8e-3);

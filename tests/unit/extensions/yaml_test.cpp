@@ -1,5 +1,5 @@
 // A plant, a reference kind and a motion-capture source that the library does not know, named in
-// YAML with keys of their own.
+// YAML with their own keys.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -59,7 +59,7 @@ std::string with(const std::string& reference, const std::string& more) {
          reference + "\n" + more;
 }
 
-TEST(AddedKinds, AreNamedWithKeysOfTheirOwn) {
+TEST(AddedKinds, AreNamedWithTheirOwnKeys) {
   const TestFolder folder;
   const Experiment e = load_experiment(folder.write(
       "a.yaml", with("{kind: curl, rate_radps: 0.5}",

@@ -5,7 +5,9 @@
 
 #include "counted_malloc.hpp"
 #include "random_arm.hpp"
+#include "softarm/model/actuation_matrix.hpp"
 #include "softarm/model/augmented_robot.hpp"
+#include "softarm/model/chambers.hpp"
 #include "softarm/model/dynamics.hpp"
 #include "softarm/model/kinematics.hpp"
 #include "softarm/model/polar.hpp"
@@ -33,13 +35,16 @@ TEST(Allocation, NoneInTheAugmentedRobot) {
 TEST(Allocation, NoneInTheLoop) {
   if (SOFTARM_COUNTS_MALLOC == 0) GTEST_SKIP() << "a sanitizer owns malloc";
   testing_support::RandomArm random(1);
-  for (const auto mass : {MassModel::point, MassModel::distributed}) {
-    const ArmParameters arm = random.arm(5, mass);
+  for (const auto& kind : testing_support::kArmKinds) {
+    const ArmParameters arm = random.arm(5, kind);
     DynamicsWorkspace workspace(arm);
-    const auto s = random.state(5, 3.0);
-    Eigen::VectorXd out(10), G(10), q(10);
-    Eigen::MatrixXd B(10, 10), C(10, 10);
-    Eigen::Matrix3Xd J(3, 10), rate(3, 10);
+    const auto s = random.state(arm, 3.0);
+    const int dof = arm.dof();
+    Eigen::VectorXd out(dof), G(dof), q(dof);
+    Eigen::MatrixXd B(dof, dof), C(dof, dof);
+    Eigen::Matrix3Xd J(3, dof), rate(3, dof);
+    const ChamberGeometry chambers{.angles_rad = {0.0, 2.0, 4.0}};
+    const double pressures[] = {0.1, 0.2, 0.3};
     std::vector<Eigen::Isometry3d> ends(5);
     SegmentVector fixed = s.u;
     const long before = test::allocations;
@@ -49,7 +54,15 @@ TEST(Allocation, NoneInTheLoop) {
       forward_dynamics(arm, workspace, s.u, s.v, s.a, out);
       kinetic_energy(arm, workspace, s.u, s.v);
       tip_jacobians(arm, s.u, s.v, J, rate);
+      tip_angular_jacobian(arm, s.u, J);
       forward_kinematics(arm, s.u, ends);
+      gravity_potential(arm, s.u);
+      apply_actuation(arm, s.u, s.a, out);
+      solve_actuation(arm, s.u, out, G);
+      add_tip_force(arm, s.u, {0.1, 0.2, 0.3}, out);
+      add_impedance(arm, s.u, s.v, out);
+      out.head<3>() += chamber_force(chambers, pressures);
+      if (arm.extensible) continue;  // no polar coordinates
       u_to_polar(s.u, q);
       dynamics_to_polar(q, s.v, B, C, G);
       jacobian_rate_to_polar(q, s.v, J, rate);

@@ -58,7 +58,7 @@ double column_error(const ArmParameters& arm) {
 }
 
 /// B of a case with a tiny theta that is not the last: 1e-12 s_i s_j is out of reach of a sum over
-/// joints, whose columns (s_i each) come with an error of their own.
+/// joints, whose columns (s_i each) have a rounding error each.
 double small_theta_ratio(const golden::Case& c, const Eigen::MatrixXd& got) {
   const Eigen::MatrixXd& B = c.expected.at("B");
   const Eigen::VectorXd s = B.diagonal().cwiseSqrt();

@@ -1,4 +1,5 @@
-// The golden cases (130-digit results, rounded to double) and the tolerances that come with them.
+// The golden cases (128 digits and more, rounded to double): arms of constant length and arms that
+// stretch, with the tolerances that come with the former (those of the latter: extensible_golden.hpp).
 #pragma once
 
 #include <gtest/gtest.h>
@@ -12,6 +13,7 @@
 #include <vector>
 
 #include "softarm/model/arm.hpp"
+#include "softarm/model/chambers.hpp"
 
 namespace softarm::golden {
 
@@ -22,8 +24,10 @@ struct Case {
   bool polar = false;
   ArmParameters arm;
   Eigen::VectorXd q, qd;
-  Terms expected, distributed;  ///< absent keys: null in the file
-  Terms control, forward, ik;   ///< inputs and results
+  Terms expected, distributed;            ///< absent keys: null in the file
+  Terms control, forward, ik;             ///< inputs and results
+  std::vector<ChamberGeometry> chambers;  ///< of every segment, where the arm is extensible
+  Terms chamber;                          ///< of all segments one after the other
 };
 
 inline void flatten(const YAML::Node& node, std::vector<double>& out) {
@@ -73,6 +77,32 @@ inline Terms terms(const YAML::Node& node) {
   return result;
 }
 
+/// What stands under `chambers`, of all segments one after the other.
+inline Terms chamber_terms(const YAML::Node& node) {
+  Terms result;
+  for (const auto& entry : node["chambers"]) {
+    std::vector<double> numbers;
+    flatten(entry.second, numbers);
+    result[entry.first.as<std::string>()] =
+        Eigen::Map<Eigen::VectorXd>(numbers.data(), static_cast<Eigen::Index>(numbers.size()));
+  }
+  return result;
+}
+
+inline void read_extensible(const YAML::Node& node, Case& c) {
+  const YAML::Node config = node["config"];
+  c.arm.extensible = true;
+  for (std::size_t i = 0; i < c.arm.segments.size(); ++i) {
+    c.arm.segments[i].axial_stiffness_n_per_m = config["k_a"][i].as<double>();
+    c.arm.segments[i].axial_damping_ns_per_m = config["beta_a"][i].as<double>();
+    const YAML::Node chambers = config["chambers"][i];
+    c.chambers.push_back({.angles_rad = chambers["chi"].as<std::vector<double>>(),
+                          .offset_m = chambers["r"].as<double>(),
+                          .area_n_per_bar = chambers["a"].as<double>()});
+  }
+  c.chamber = chamber_terms(node);
+}
+
 inline Case read_case(const YAML::Node& node) {
   Case c;
   c.id = node["id"].as<std::string>();
@@ -84,6 +114,7 @@ inline Case read_case(const YAML::Node& node) {
                               .stiffness_nm_per_rad = config["k"][i].as<double>(),
                               .damping_nms_per_rad = config["beta"][i].as<double>()});
   }
+  if (config["coords"].as<std::string>() == "cartesian_ue") read_extensible(node, c);
   c.arm.mass = MassModel::point;
   c.arm.base_rotation = matrix(config["base_rotation"]);
   c.arm.base_position_m = matrix(config["base_position"]);
@@ -98,15 +129,18 @@ inline Case read_case(const YAML::Node& node) {
   return c;
 }
 
-inline std::string path() { return std::string(SOFTARM_SOURCE_DIR) + "/tests/golden/golden.json"; }
+inline std::string path(const std::string& name = "golden.json") {
+  return std::string(SOFTARM_SOURCE_DIR) + "/tests/golden/" + name;
+}
+
+inline std::vector<Case> read_cases(const std::string& file) {
+  std::vector<Case> result;
+  for (const auto& node : YAML::LoadFile(file)["cases"]) result.push_back(read_case(node));
+  return result;
+}
 
 inline const std::vector<Case>& cases() {
-  static const std::vector<Case> all = [] {
-    std::vector<Case> result;
-    const YAML::Node file = YAML::LoadFile(path());
-    for (const auto& node : file["cases"]) result.push_back(read_case(node));
-    return result;
-  }();
+  static const std::vector<Case> all = read_cases(path());
   return all;
 }
 

@@ -1,14 +1,14 @@
-// log.csv and timing.json as who reads them back sees them.
+// log.csv and timing.json as a reader of the files sees them.
 #include "softarm/recording/experiment_log.hpp"
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
 #include "softarm/config/load.hpp"
+#include "test_folder.hpp"
 
 namespace softarm {
 namespace {
@@ -22,8 +22,6 @@ std::vector<std::string> split(const std::string& line) {
 
 class WrittenLog : public ::testing::Test {
  protected:
-  void TearDown() override { std::filesystem::remove_all(folder_); }
-
   /// Lines of log.csv with these rows in it.
   std::vector<std::string> lines(const std::vector<LogRow>& rows) {
     ExperimentLog log(folder_, experiment_);
@@ -44,8 +42,8 @@ class WrittenLog : public ::testing::Test {
 
   Experiment experiment_ =
       load_experiment(std::filesystem::path(SOFTARM_SOURCE_DIR) / "config" / "paper_arm.yaml");
-  std::filesystem::path folder_ = std::filesystem::temp_directory_path() /
-                                  ("softarm_experiment_log_" + std::to_string(getpid()));
+  TestFolder parent_;
+  std::filesystem::path folder_ = parent_ / "record";  // not there yet
 };
 
 TEST_F(WrittenLog, EveryNumberStandsUnderItsName) {
@@ -94,7 +92,7 @@ TEST_F(WrittenLog, AFullDiskIsAnError) {
   ExperimentLog log(folder_, experiment_);
   log.add(LogRow{});
   EXPECT_THROW(log.close(), std::runtime_error);
-  EXPECT_THROW(write_text("/dev/full", "text"), std::runtime_error);
+  EXPECT_THROW(write_text("/dev/full", "text", {}), std::runtime_error);
 }
 
 TEST(TimingReport, HasQuantilesAndCounts) {

@@ -14,6 +14,7 @@
 #include "softarm/simulation/simulated_arm.hpp"
 #include "softarm/transport/mocap_adapter.hpp"
 #include "softarm/transport/softarm_mocap.hpp"
+#include "test_folder.hpp"
 
 namespace softarm {
 namespace {
@@ -44,13 +45,9 @@ class RecordedAtRest : public ::testing::Test {
       }
     }
   }
-  void TearDown() override { std::filesystem::remove(path_); }
 
-  std::string log() const {
-    std::ifstream file(path_, std::ios::binary);
-    return {std::istreambuf_iterator<char>(file), {}};
-  }
-  void write(const std::string& bytes) const { std::ofstream(path_, std::ios::binary) << bytes; }
+  std::string log() const { return file_text(path_); }
+  void write(const std::string& bytes) const { folder_.write("log", bytes); }
 
   /// Seconds of ACTIVE; the last row is in `row_`.
   double active_s() {
@@ -62,9 +59,8 @@ class RecordedAtRest : public ::testing::Test {
 
   Experiment experiment_ =
       load_experiment(std::filesystem::path(SOFTARM_SOURCE_DIR) / "config" / "paper_arm.yaml");
-  std::string path_ =
-      (std::filesystem::temp_directory_path() / ("softarm_logged_run_" + std::to_string(getpid())))
-          .string();
+  TestFolder folder_;
+  std::string path_ = (folder_ / "log").string();
   LogRow row_;
 };
 

@@ -59,7 +59,7 @@ struct RecordedRun {
 
 /// Runs the pipeline on a simulated arm for `seconds` and appends to the log what a daemon would
 /// have published. Faults: a body occluded, frames doubled, broken and kept back, the process
-/// stopped, disarmed and armed, a live reference offered, shut down in the end.
+/// stopped, disarmed and armed, a live reference sent, and shut down.
 inline RecordedRun record_run(const Experiment& experiment, double seconds, bool shadow,
                               LogBytes& log, const Losses& losses = {},
                               std::int64_t start_ns = 7'000'000'000) {

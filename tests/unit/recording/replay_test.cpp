@@ -164,7 +164,7 @@ TEST_F(LockStepReplay, ALoggerThatMissesATenthOfASecondLosesNothing) {
   }
 }
 
-TEST_F(LockStepReplay, AGapIsToldAndNothingAfterItIsProof) {
+TEST_F(LockStepReplay, AGapIsReportedAndNothingAfterItIsProof) {
   LogBytes log;
   const auto run = test::record_run(experiment_, 5.0, false, log,
                                     {[](auto tick, int) { return tick < 1000 || tick >= 1100; }});
@@ -180,7 +180,7 @@ TEST_F(LockStepReplay, AGapIsToldAndNothingAfterItIsProof) {
   EXPECT_GT(summary.agrees_again, 1099) << "vented in the end";
 }
 
-TEST_F(LockStepReplay, AnotherRunBeginsAnewAndALateLoggerIsTold) {
+TEST_F(LockStepReplay, AnotherRunBeginsAgainAndALateLoggerIsReported) {
   LogBytes log;
   const auto late = [](auto tick, int) { return tick > 700; };
   const auto first = test::record_run(experiment_, 3.0, false, log, {late});
@@ -214,7 +214,7 @@ TEST_F(LockStepReplay, CutAndDamagedLogsAreUsedBeforeAndAfter) {
   EXPECT_FALSE(changed.summary.different());
   EXPECT_FALSE(changed.summary.complete());
 
-  // A torn stretch of the log that costs less than a tenth of a second costs no tick.
+  // A damaged range of the log that costs less than a tenth of a second costs no tick.
   std::string torn = log_.bytes;
   const std::int64_t from = records[700].position + 20;
   std::fill_n(torn.begin() + from, 30'000, '\x5a');

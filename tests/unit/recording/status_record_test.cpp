@@ -1,9 +1,7 @@
-// A record of statuses that goes on for as long as somebody watches: what it keeps is bounded, and
-// no row is lost.
+// A record of statuses may go on for any time: what it keeps is bounded, and no row is lost.
 #include "softarm/recording/status_record.hpp"
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <filesystem>
 #include <fstream>
@@ -13,6 +11,7 @@
 #include "counted_malloc.hpp"
 #include "softarm/config/load.hpp"
 #include "softarm/recording/tracking_summary.hpp"
+#include "test_folder.hpp"
 #include "unit/transport/messages.hpp"
 
 namespace softarm {
@@ -46,10 +45,10 @@ TEST(TrackingSummary, KeepsNoMoreOfALongRunThanOfAShortOne) {
   for (; k < 200'000; ++k) summary.add(row_of_simulated_arm(k), 0.002);
   const long before = test::thread_allocations;
   for (; k < 800'000; ++k) summary.add(row_of_simulated_arm(k), 0.002);
-  EXPECT_EQ(test::thread_allocations, before) << "a row is not kept for ever";
+  EXPECT_EQ(test::thread_allocations, before) << "rows are not kept";
 }
 
-TEST(TrackingSummary, TellsTheHalvesOfALongRunApart) {
+TEST(TrackingSummary, SeparatesTheHalvesOfALongRun) {
   TrackingSummary summary(1, 0.0);
   for (std::int64_t k = 0; k < 400'000; ++k) summary.add(row_of_simulated_arm(k), 0.002);
   // 800 s: the first half is 1 mm off, the second 3 mm.
@@ -60,12 +59,6 @@ TEST(TrackingSummary, TellsTheHalvesOfALongRunApart) {
 
 class StatusRecords : public ::testing::Test {
  protected:
-  void SetUp() override {
-    folder_ = fs::temp_directory_path() / ("softarm_record_" + std::to_string(getpid()));
-    fs::create_directories(folder_);
-  }
-  void TearDown() override { fs::remove_all(folder_); }
-
   bool take(StatusRecord& record, std::int64_t time_us) {
     auto status = test::example<controller_status_t>(3, 4);
     status.time_us = time_us;
@@ -95,12 +88,12 @@ class StatusRecords : public ::testing::Test {
   }
 
   Experiment experiment_ = load_experiment(SOFTARM_SOURCE_DIR "/config/paper_arm.yaml");
-  fs::path folder_;
+  TestFolder folder_;
 };
 
 // The daemon of another machine, after that was started again.
 TEST_F(StatusRecords, LoseNoRowWhereTheDaemonsClockBeginsAgain) {
-  StatusRecord record(experiment_, folder_);
+  StatusRecord record(experiment_, folder_.path());
   constexpr int kAfter = 6000;
   for (int k = 0; k < 10; ++k) ASSERT_TRUE(take(record, 5'000'000'000 + 2000 * k));
   for (int k = 0; k < kAfter; ++k) {
@@ -111,7 +104,7 @@ TEST_F(StatusRecords, LoseNoRowWhereTheDaemonsClockBeginsAgain) {
 }
 
 TEST_F(StatusRecords, GiveARowTheTruthBetweenTwoReportsOfTheSimulatedArm) {
-  StatusRecord record(experiment_, folder_);
+  StatusRecord record(experiment_, folder_.path());
   auto state = test::example<plant_state_t>(3, 4);
   const auto report = [&](std::int64_t time_us, double u_rad) {
     state.time_us = time_us;

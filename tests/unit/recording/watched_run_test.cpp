@@ -1,6 +1,5 @@
 // A run as its messages tell it: whose statuses count, and what a simulated arm adds to them.
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <cmath>
 #include <fstream>
@@ -10,6 +9,7 @@
 #include "softarm/config/load.hpp"
 #include "softarm/recording/status_record.hpp"
 #include "softarm/transport/settings.hpp"
+#include "test_folder.hpp"
 #include "unit/transport/messages.hpp"
 
 namespace softarm {
@@ -78,7 +78,6 @@ TEST(TruthTrack, IsExactForACubicBetweenTwoReportsAndEmptyElsewhere) {
 
 class Record : public ::testing::Test {
  protected:
-  void TearDown() override { std::filesystem::remove_all(folder_); }
   bool take(StatusRecord& record, const controller_status_t& status) {
     return record.take(experiment_.transport.lcm.status_channel, encoded(status));
   }
@@ -100,8 +99,8 @@ class Record : public ::testing::Test {
 
   Experiment experiment_ =
       load_experiment(std::filesystem::path(SOFTARM_SOURCE_DIR) / "config" / "paper_arm.yaml");
-  std::filesystem::path folder_ = std::filesystem::temp_directory_path() /
-                                  ("softarm_status_record_" + std::to_string(getpid()));
+  TestFolder parent_;
+  std::filesystem::path folder_ = parent_ / "record";  // not there yet
 };
 
 TEST_F(Record, EveryStatusIsARowAndTheTruthOfItsInstantIsInIt) {

@@ -26,7 +26,7 @@ TEST(PipelineAllocation, TenThousandTicksThroughAllModes) {
     const auto bench = std::make_unique<PipelineBench>(experiment);
     LiveReferenceInput live;
     live.u = live.velocity = live.acceleration = SegmentVector::Zero(6);
-    bench->spoil = [](MocapFrame& frame) {  // a spoilt frame, too, must cost nothing
+    bench->corrupt = [](MocapFrame& frame) {  // a corrupt frame must allocate nothing either
       if (frame.frame_number % 97 == 0) frame.body[1].position_m.x() = std::nan("");
       if (frame.frame_number % 101 == 0) frame.body[2].valid = false;
       return true;

@@ -1,4 +1,4 @@
-// The tick as a whole: which frames it believes, what it does without them, how it takes a live
+// The tick as a whole: which frames it uses, what it does without them, how it takes a live
 // reference.
 #include "softarm/runtime/control_pipeline.hpp"
 
@@ -49,7 +49,7 @@ TEST_F(Pipeline, FrozenPosesHoldWhileTheCommandMoves) {
   PipelineBench bench(experiment);
   bend(bench);
   MocapFrame frozen = bench.exact_frame();
-  bench.spoil = [&](MocapFrame& frame) {
+  bench.corrupt = [&](MocapFrame& frame) {
     frame.body = frozen.body;
     return true;
   };
@@ -70,7 +70,7 @@ TEST_F(Pipeline, AnExactArmAtRestIsNotFrozen) {
   still.reference.phases = {{rest, 0.0}};
   PipelineBench bench(still);
   MocapFrame first = bench.exact_frame();
-  bench.spoil = [&](MocapFrame& frame) {
+  bench.corrupt = [&](MocapFrame& frame) {
     frame.body = first.body;
     return true;
   };
@@ -81,7 +81,7 @@ TEST_F(Pipeline, AnExactArmAtRestIsNotFrozen) {
 TEST_F(Pipeline, AnOccludedBodyIsPredictedThenHeldThenVented) {
   PipelineBench bench(experiment);
   bend(bench);
-  bench.spoil = [](MocapFrame& frame) {
+  bench.corrupt = [](MocapFrame& frame) {
     frame.body[2].valid = false;
     return true;
   };
@@ -89,7 +89,7 @@ TEST_F(Pipeline, AnOccludedBodyIsPredictedThenHeldThenVented) {
   bool all_valid_while_active = true;
   while (bench.tick().mode == Mode::active && bench.now_ns < since_ns + 200 * kMs)
     all_valid_while_active &= bench.pipeline.output().motion.all_valid();
-  EXPECT_TRUE(all_valid_while_active) << "control on a segment that nobody knows";
+  EXPECT_TRUE(all_valid_while_active) << "control with a segment that is not known";
   EXPECT_EQ(bench.pipeline.output().mode, Mode::hold);
   EXPECT_EQ(bench.pipeline.output().reason, Reason::frames_late);
   // 3 frame periods and the latency after the last capture that saw it.
@@ -107,7 +107,7 @@ TEST_F(Pipeline, AnUnknownSegmentIsNeverControlled) {
   PipelineBench bench(experiment);
   bench.frame_period_ns = 2 * kMs;
   bend(bench);
-  bench.spoil = [](MocapFrame& frame) {
+  bench.corrupt = [](MocapFrame& frame) {
     frame.body[3].valid = false;
     return true;
   };
@@ -123,7 +123,7 @@ TEST_F(Pipeline, ABriefOcclusionIsSurvived) {
   PipelineBench bench(experiment);
   bend(bench);
   int left = 2;
-  bench.spoil = [&](MocapFrame& frame) {
+  bench.corrupt = [&](MocapFrame& frame) {
     if (left-- > 0) frame.body[1].valid = false;
     return true;
   };
@@ -136,7 +136,7 @@ TEST_F(Pipeline, SwappedBodiesAreRejected) {
   const std::int64_t accepted = bench.pipeline.counters().accepted;
   const std::pair<std::size_t, std::size_t> swaps[] = {{1, 2}, {2, 3}, {1, 3}, {0, 1}, {0, 3}};
   int sent = 0;
-  bench.spoil = [&](MocapFrame& frame) {
+  bench.corrupt = [&](MocapFrame& frame) {
     const auto [a, b] = swaps[static_cast<std::size_t>(sent++ % 5)];
     std::swap(frame.body[a], frame.body[b]);
     return true;
@@ -160,10 +160,10 @@ TEST_F(Pipeline, LateFramesAreDroppedAndCounted) {
   EXPECT_EQ(bench.pipeline.output().reason, Reason::frames_stale);
 }
 
-TEST_F(Pipeline, ACaptureInTheFutureIsNotBelieved) {
+TEST_F(Pipeline, ACaptureInTheFutureIsNotUsed) {
   PipelineBench bench(experiment);
   bend(bench);
-  bench.spoil = [&](MocapFrame& frame) {
+  bench.corrupt = [&](MocapFrame& frame) {
     bench.send(frame, bench.latency_ns);
     frame.frame_number = bench.next_number++;
     frame.capture_ns += 3600 * std::int64_t{1000} * kMs;
@@ -171,7 +171,7 @@ TEST_F(Pipeline, ACaptureInTheFutureIsNotBelieved) {
     return false;
   };
   bench.run(20);
-  bench.spoil = nullptr;
+  bench.corrupt = nullptr;
   bench.publishing = false;
   EXPECT_GT(bench.run_to(Mode::vent, 100), 0) << "a sender's wrong clock must not hide its silence";
 }
@@ -199,6 +199,28 @@ TEST_F(Pipeline, AGapInTimeVentsAndForgetsWhatWasQueued) {
   EXPECT_EQ(bench.pipeline.counters().accepted, accepted);
 }
 
+// The machine was suspended: no time has passed on its clock, but for everything else it has.
+TEST_F(Pipeline, APauseOfTheClockVentsForgetsTheCommandAndWhatWasQueued) {
+  Experiment explicitly = experiment;
+  explicitly.safety.arming = Arming::explicit_;
+  PipelineBench bench(explicitly);
+  bench.run(200);
+  bench.input.requests.arm = true;
+  ASSERT_GT(bench.run_to(Mode::active), 0);
+  bench.run(500);
+  ASSERT_GT(bench.pipeline.output().pressure_bar.maxCoeff(), 0.1);
+  const std::int64_t accepted = bench.pipeline.counters().accepted;
+  bench.input.paused = true;
+  bench.tick();
+  bench.input.paused = false;
+  EXPECT_EQ(bench.pipeline.output().mode, Mode::vent);
+  EXPECT_EQ(bench.pipeline.output().reason, Reason::time_gap);
+  EXPECT_TRUE(bench.pipeline.output().pressure_bar.isZero());
+  EXPECT_EQ(bench.pipeline.counters().accepted, accepted);
+  EXPECT_EQ(bench.run_to(Mode::active), -1);
+  EXPECT_FALSE(bench.pipeline.output().armed);
+}
+
 // The valves vent while we are held up: what was commanded before is nothing to go on from.
 TEST_F(Pipeline, AfterAStallPressuresRiseFromZeroWithinTheSlew) {
   Experiment slow = experiment;
@@ -215,8 +237,8 @@ TEST_F(Pipeline, AfterAStallPressuresRiseFromZeroWithinTheSlew) {
   }
 }
 
-// The valves have vented, shorter though it was than the gap that vents: who armed the arm has to
-// see that first.
+// The valves have vented, although the stall was shorter than the gap that vents: the operator has
+// to see that before the arm is armed again.
 TEST_F(Pipeline, AfterAStallThatOutlivedACommandTheArmIsVentedAndDisarmed) {
   Experiment explicitly = experiment;
   explicitly.safety.arming = Arming::explicit_;
@@ -241,7 +263,8 @@ TEST_F(Pipeline, FramesThatQueuedUpInAStopDoNotMakeItActive) {
   bench.next_capture_ns = bench.now_ns;
   bench.tick();
   ASSERT_EQ(bench.pipeline.output().reason, Reason::time_gap);
-  bench.frame_period_ns = bench.latency_ns = 100'000;  // as they leave the kernel, stamped anew
+  bench.frame_period_ns = bench.latency_ns =
+      100'000;  // as they leave the kernel, with new time stamps
   EXPECT_EQ(bench.run_to(Mode::active, 240), -1);
   EXPECT_GT(bench.run_to(Mode::active), 0);
 }
@@ -249,7 +272,7 @@ TEST_F(Pipeline, FramesThatQueuedUpInAStopDoNotMakeItActive) {
 TEST_F(Pipeline, ASoftLimitCountsInHoldWhileTheArmIsSeen) {
   PipelineBench bench(experiment);
   bend(bench);
-  bench.spoil = [](MocapFrame& frame) {  // one frame in 20 is bad: HOLD does not end
+  bench.corrupt = [](MocapFrame& frame) {  // one frame in 20 is bad: HOLD does not end
     if (frame.frame_number % 20 == 0) frame.body[1].valid = false;
     return true;
   };
@@ -331,7 +354,7 @@ TEST_F(LiveReferenceInPipeline, IsJoinedSmoothly) {
     largest_step = std::max(largest_step, (output.reference.u - before).cwiseAbs().maxCoeff());
     before = output.reference.u;
   }
-  // A quintic over blend_s is fastest at 15/8 of its mean speed; every message begins one anew.
+  // A quintic over blend_s is fastest at 15/8 of its mean speed; every message begins a new one.
   EXPECT_LT(largest_step, 1.25 * 1.875 * 0.1 * 0.002 / settings.control.blend_s);
   EXPECT_LT((before - message.u).norm(), 1e-3);
 }
@@ -356,7 +379,7 @@ TEST_F(LiveReferenceInPipeline, BeforeActiveAndInHoldItIsIgnored) {
   PipelineBench bench(settings);
   while (bench.pipeline.output().mode != Mode::active) {
     bench.input.reference = &message;
-    ASSERT_FALSE(bench.tick().reference_limited) << "nothing was limited: nobody listened yet";
+    ASSERT_FALSE(bench.tick().reference_limited) << "nothing was limited: there was no status yet";
   }
   bench.run(10);
   bench.publishing = false;

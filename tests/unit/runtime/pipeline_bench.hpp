@@ -1,5 +1,5 @@
 // The pipeline with an ideal arm around it: the arm is where the reference says, motion capture
-// sees it exactly, and a test may spoil any frame on its way.
+// sees it exactly, and a test may corrupt any frame on its way.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -86,19 +86,19 @@ class PipelineBench {
   std::int64_t next_number = 1;
   TickInput input;
   bool publishing = true;
-  bool moves = true;  ///< false: the arm stays where it is, whatever it is told
+  bool moves = true;  ///< false: the arm stays where it is, whatever is commanded
   std::int64_t frame_period_ns = 5 * kMs;
   std::int64_t latency_ns = 5 * kMs;
   std::span<const MocapFrame> delivered() const { return {arrived.data(), count}; }
 
   bool valves_publish = true;  ///< pressures, 10 ms behind the commands
-  bool going = true;           ///< somebody holds the dead-man switch
+  bool going = true;           ///< the dead-man switch is held
   bool sends = true;           ///< commands reach the valves
   std::int64_t sent_ns = 0;    ///< the newest that did
-  /// Spoils what the valves measured.
+  /// Corrupts what the valves measured.
   std::function<void(PressureVector&)> leak;
-  /// Spoils a frame before it is sent; returns whether to send it.
-  std::function<bool(MocapFrame&)> spoil;
+  /// Corrupts a frame before it is sent; returns whether to send it.
+  std::function<bool(MocapFrame&)> corrupt;
 
  private:
   struct Flying {
@@ -120,7 +120,7 @@ class PipelineBench {
     MocapFrame frame = exact_frame();
     // The least movement, so that an arm at rest is not taken for a frozen sensor.
     frame.body[0].position_m.x() += frame.frame_number % 2 == 0 ? 1e-7 : -1e-7;
-    if (publishing && (!spoil || spoil(frame))) send(frame, latency_ns);
+    if (publishing && (!corrupt || corrupt(frame))) send(frame, latency_ns);
   }
   void publish_pressures() {
     const PressureVector& commanded = pipeline.output().pressure_bar;

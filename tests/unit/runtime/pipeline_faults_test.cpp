@@ -1,4 +1,4 @@
-// Numbers that are none, and the same sequence of faults twice.
+// NaN and infinity, and the same sequence of faults twice.
 #include <gtest/gtest.h>
 
 #include <cstring>
@@ -31,7 +31,7 @@ TEST(PipelineFaults, SilentValvesVentWithinTheLimits) {
   EXPECT_TRUE(bench.pipeline.fully_vented());
 }
 
-// Every number of a frame in turn is spoilt while the arm is bent under pressure.
+// Every number of a frame in turn is corrupted while the arm is bent under pressure.
 TEST(PipelineFaults, NoBadNumberReachesTheValves) {
   const Experiment experiment = test::paper_arm();
   const double bad[] = {std::numeric_limits<double>::quiet_NaN(),
@@ -42,9 +42,9 @@ TEST(PipelineFaults, NoBadNumberReachesTheValves) {
   PressureLimits limits(experiment);
   ASSERT_GT(bench.run_to(Mode::active), 0);
   limits.violation(bench.run(500));
-  int spoilt = 0;
-  bench.spoil = [&](MocapFrame& frame) {
-    const int which = spoilt++;
+  int corrupted = 0;
+  bench.corrupt = [&](MocapFrame& frame) {
+    const int which = corrupted++;
     const std::size_t body = static_cast<std::size_t>(which / 7 % 4);
     const double number = bad[which / 28 % 5];
     if (which % 7 < 3) {
@@ -55,7 +55,7 @@ TEST(PipelineFaults, NoBadNumberReachesTheValves) {
     return true;
   };
   const std::int64_t accepted = bench.pipeline.counters().accepted;
-  while (spoilt < 140) ASSERT_STREQ(limits.violation(bench.tick()), "") << spoilt;
+  while (corrupted < 140) ASSERT_STREQ(limits.violation(bench.tick()), "") << corrupted;
   EXPECT_LE(bench.pipeline.counters().accepted, accepted + 1);
   EXPECT_EQ(bench.pipeline.output().mode, Mode::vent);
 }
@@ -82,7 +82,7 @@ TEST(PipelineFaults, SameInputSameBits) {
   const auto history = [&](unsigned seed) {
     PipelineBench bench(experiment);
     RandomFaults faults(bench, seed);
-    bench.spoil = [&](MocapFrame& frame) { return faults.spoil(frame); };
+    bench.corrupt = [&](MocapFrame& frame) { return faults.corrupt(frame); };
     std::vector<double> all;
     for (int k = 0; k < 3000; ++k) {
       faults.before_tick();

@@ -127,7 +127,7 @@ TEST(SafetyMonitor, ArmingIsNotStoredUpForLater) {
   bench.input.requests.arm = true;
   bench.tick();
   bench.frames_per_tick = 1;
-  EXPECT_EQ(bench.run(200), Mode::wait_frames) << "armed when nobody could see the arm";
+  EXPECT_EQ(bench.run(200), Mode::wait_frames) << "armed when the arm could not be seen";
 }
 
 TEST(SafetyMonitor, AnArmingThatWaitsForFramesIsTakenBackByWhatWouldVent) {

@@ -258,7 +258,7 @@ TEST(ArmPlant, HowTimeIsCutDoesNotMatter) {
   EXPECT_LT((whole.pressures_bar() - cut.pressures_bar()).norm(), 1e-12);
 }
 
-TEST(ArmPlant, TellsPosesOfItsState) {
+TEST(ArmPlant, ReportsPosesOfItsState) {
   PlantSettings settings = paper_arm();
   settings.arm.base_position_m = {1.0, 2.0, 3.0};
   settings.initial_u_rad = bent();
@@ -272,7 +272,7 @@ TEST(ArmPlant, TellsPosesOfItsState) {
   EXPECT_EQ(plant.segments(), 3);
 }
 
-TEST(ArmPlant, ResetPutsItElsewhereAndStartsTheAccountsAnew) {
+TEST(ArmPlant, ResetPutsItElsewhereAndStartsTheAccountsAgain) {
   PlantSettings settings = paper_arm();
   settings.account_energy = true;
   ArmPlant plant(settings);

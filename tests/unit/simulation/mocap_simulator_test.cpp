@@ -37,7 +37,7 @@ Eigen::Vector3d rotation_vector(const Eigen::Quaterniond& q) {
   return turn.angle() * turn.axis();
 }
 
-TEST(MocapSimulator, WithoutNoiseTellsTheTruth) {
+TEST(MocapSimulator, WithoutNoiseReportsTheTruth) {
   const auto frames = record({}, 1, 3);
   ASSERT_EQ(frames.size(), 3u);
   EXPECT_EQ(frames[2].segments, 2);

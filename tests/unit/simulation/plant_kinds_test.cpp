@@ -166,7 +166,7 @@ TEST(PlantKinds, WeightsKeepLengthMassAndTheBendUnderAUniformMoment) {
   EXPECT_THROW(ArmPlant{settings}, std::invalid_argument);
 }
 
-TEST(PlantKinds, JointValuesOfTheirOwnReplaceThoseOfTheSegment) {
+TEST(PlantKinds, SeparateJointValuesReplaceThoseOfTheSegment) {
   PlantSettings settings = by_torque(kLinks, 1, 6);
   settings.arm.gravity_mps2.setZero();
   settings.kind = LinkSettings{

@@ -58,7 +58,7 @@ TEST(SimulatedArm, VentsWhenCommandsStop) {
   EXPECT_FALSE(arm.vented());
   arm.advance_to(kStart + 150 * kMs);
   EXPECT_TRUE(arm.vented());
-  // Up for 100 ms, down for 40 ms with a lag of 20 ms, although nobody called at the expiry itself.
+  // Up for 100 ms, down for 40 ms with a lag of 20 ms, although nothing was called at the expiry.
   for (Eigen::Index i = 0; i < 12; ++i) {
     const double top = pressures[static_cast<std::size_t>(i)] * (1.0 - std::exp(-5.0));
     EXPECT_NEAR(arm.measured_pressures_bar()[i], top * std::exp(-2.0), 1e-9);

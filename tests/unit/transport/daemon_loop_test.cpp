@@ -2,13 +2,13 @@
 #include "softarm/transport/daemon_loop.hpp"
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <memory>
 #include <string>
 #include <vector>
 
+#include "own_url.hpp"
 #include "softarm/base/clock.hpp"
 #include "softarm/transport/message_decoding.hpp"
 
@@ -28,8 +28,7 @@ class DaemonLoopOverUdp : public ::testing::Test {
     settings.reference.phases = {{SetPointReference{{0.2, 0.0}}, 0.0}};
     settings.rate_hz = 200.0;
     transport.bodies = {.base_id = 0, .segment_ids = {1}};
-    transport.lcm.url =
-        "udpm://239.255.76.67:" + std::to_string(20000 + getpid() % 12000) + "?ttl=0";
+    transport.lcm.url = test::own_url();
     try {
       listener = std::make_unique<LcmNode>(transport.lcm.url);
       listener->subscribe(transport.lcm.command_channel, 4096, [this](const ReceivedMessage& each) {

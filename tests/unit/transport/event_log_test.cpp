@@ -12,6 +12,8 @@
 #include <sstream>
 #include <string>
 
+#include "test_folder.hpp"
+
 namespace softarm {
 namespace {
 
@@ -44,8 +46,8 @@ Reading read(const std::string& bytes) {
 
 /// A log as LCM itself writes it: events of all small sizes, random bytes, the empty one too.
 std::string lcm_log(int events, std::size_t largest, unsigned seed = 1) {
-  const auto path =
-      std::filesystem::temp_directory_path() / ("softarm_event_log_" + std::to_string(getpid()));
+  const TestFolder folder;
+  const auto path = folder / "log";
   std::mt19937 random(seed);
   {
     lcm::LogFile log(path.string(), "w");
@@ -60,10 +62,7 @@ std::string lcm_log(int events, std::size_t largest, unsigned seed = 1) {
       log.writeEvent(&event);
     }
   }
-  std::ostringstream text;
-  text << std::ifstream(path, std::ios::binary).rdbuf();
-  std::filesystem::remove(path);
-  return text.str();
+  return file_text(path);
 }
 
 std::size_t end_of(const Copy& event) {
@@ -174,9 +173,8 @@ TEST(EventLog, NoiseAndHostileSizesAreOnlyDamage) {
 
 class WrittenLog : public ::testing::Test {
  protected:
-  ~WrittenLog() override { std::filesystem::remove(path_); }
-  const std::filesystem::path path_ =
-      std::filesystem::temp_directory_path() / ("softarm_written_log_" + std::to_string(getpid()));
+  const TestFolder folder_;
+  const std::filesystem::path path_ = folder_ / "log";
 };
 
 TEST_F(WrittenLog, IsByteForByteWhatLcmWrites) {
@@ -188,9 +186,7 @@ TEST_F(WrittenLog, IsByteForByteWhatLcmWrites) {
     for (LogEvent event; reader.next(event);) log.write(event.time_us, event.channel, event.data);
     log.close();
   }
-  std::ostringstream written;
-  written << std::ifstream(path_, std::ios::binary).rdbuf();
-  EXPECT_TRUE(written.str() == expected);
+  EXPECT_TRUE(file_text(path_) == expected);
 }
 
 TEST_F(WrittenLog, RefusesWhatNoReaderWouldTakeAndReportsAFullDisk) {

@@ -37,7 +37,7 @@ class Assembling : public ::testing::Test {
   }
   void collect() {
     MocapFrame frame;
-    frame.body[0].valid = true;  // whoever has a fixed base puts it there
+    frame.body[0].valid = true;  // where the base is fixed, its pose is set before
     if (!assembler.take_done(frame)) return;
     Done out{frame.frame_number, frame.capture_ns, {}, -1.0};
     for (int i = 0; i < 4; ++i) {

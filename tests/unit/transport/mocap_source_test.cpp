@@ -29,7 +29,7 @@ Eigen::Isometry3d random_pose(std::mt19937& random) {
   return pose;
 }
 
-/// Y up, millimetres, x y z w, and a plate on every body.
+/// Y up, millimetres, x y z w, and a marker frame on every body.
 TransportSettings foreign(const char* source, std::mt19937& random) {
   TransportSettings transport;
   transport.mocap = {.source = *mocap_sources().find(source),
@@ -37,9 +37,9 @@ TransportSettings foreign(const char* source, std::mt19937& random) {
                      .quaternion = QuaternionOrder::xyzw,
                      .axes = Eigen::Matrix3d::Identity()};
   transport.mocap.axes << 1, 0, 0, 0, 0, -1, 0, 1, 0;
-  transport.lcm.mocap_channel = "ROOM";
+  transport.lcm.mocap_channel = "LAB";
   transport.bodies = {.base_id = 10, .segment_ids = {30, 20}};
-  const auto plate = [&](const std::string& name) {
+  const auto marker_frame = [&](const std::string& name) {
     MarkerFrameSettings out;
     out.name = name;
     const Eigen::AngleAxisd turn(random_pose(random).linear());
@@ -47,8 +47,8 @@ TransportSettings foreign(const char* source, std::mt19937& random) {
     out.position_m = random_pose(random).translation();
     return out;
   };
-  transport.bodies.base_plate = plate("base");
-  transport.bodies.segment_plates = {plate("middle"), plate("tip")};
+  transport.bodies.base_marker_frame = marker_frame("base");
+  transport.bodies.segment_marker_frames = {marker_frame("middle"), marker_frame("tip")};
   return transport;
 }
 
@@ -59,13 +59,14 @@ ArmParameters two_segments() {
   return arm;
 }
 
-/// What a camera of that world would say of S_i at `pose`, by matrices: sent = A^-1 S_i plate^-1.
-Eigen::Isometry3d sent(const Eigen::Isometry3d& pose, const MarkerFrameSettings& plate,
+/// What that source would send of S_i at `pose`, by matrices: sent = A^-1 S_i frame^-1.
+Eigen::Isometry3d sent(const Eigen::Isometry3d& pose, const MarkerFrameSettings& marker_frame,
                        const Eigen::Matrix3d& axes) {
   Eigen::Isometry3d on_body = Eigen::Isometry3d::Identity();
   on_body.linear() =
-      Eigen::AngleAxisd(plate.rotation_rad.norm(), plate.rotation_rad.normalized()).matrix();
-  on_body.translation() = plate.position_m;
+      Eigen::AngleAxisd(marker_frame.rotation_rad.norm(), marker_frame.rotation_rad.normalized())
+          .matrix();
+  on_body.translation() = marker_frame.position_m;
   Eigen::Isometry3d world = Eigen::Isometry3d::Identity();
   world.linear() = axes;
   return world.inverse() * pose * on_body.inverse();
@@ -88,13 +89,13 @@ TEST(MocapSource, OptitrackFramesBecomePosesOfTheSegmentsEnds) {
   std::mt19937 random(2);
   const TransportSettings transport = foreign("optitrack", random);
   MocapSource source(transport, {}, two_segments());
-  ASSERT_EQ(source.channels(), std::vector<std::string>{"ROOM"});
+  ASSERT_EQ(source.channels(), std::vector<std::string>{"LAB"});
   for (int trial = 0; trial < 20; ++trial) {
     const Eigen::Isometry3d truth[] = {random_pose(random), random_pose(random),
                                        random_pose(random)};
-    const MarkerFrameSettings plates[] = {transport.bodies.base_plate,
-                                          transport.bodies.segment_plates[0],
-                                          transport.bodies.segment_plates[1]};
+    const MarkerFrameSettings marker_frames[] = {transport.bodies.base_marker_frame,
+                                                 transport.bodies.segment_marker_frames[0],
+                                                 transport.bodies.segment_marker_frames[1]};
     const int ids[] = {10, 30, 20};
     optitrack_frame_t message{};
     message.utime = 5;
@@ -106,7 +107,7 @@ TEST(MocapSource, OptitrackFramesBecomePosesOfTheSegmentsEnds) {
       auto& body = message.rigid_bodies[(i + 1) % 3];
       body.id = ids[i];
       body.params = trial == 3 && i == 1 ? 2 : 3;
-      write(sent(truth[i], plates[i], transport.mocap.axes), body.xyz, body.quat);
+      write(sent(truth[i], marker_frames[i], transport.mocap.axes), body.xyz, body.quat);
     }
     MocapFrame frame;
     ASSERT_EQ(source.take(0, encoded(message), 1'000'000'000 + 5'000'000 * trial, frame),
@@ -126,16 +127,16 @@ TEST(MocapSource, OptitrackFramesBecomePosesOfTheSegmentsEnds) {
   }
 }
 
-TEST(MocapSource, BodiesOnChannelsOfTheirOwnBecomeOneFrame) {
+TEST(MocapSource, BodiesOnSeparateChannelsBecomeOneFrame) {
   std::mt19937 random(3);
   const TransportSettings transport = foreign("rigid_transform", random);
   MocapSource source(transport, {}, two_segments());
-  ASSERT_EQ(source.channels(), (std::vector<std::string>{"ROOM_base", "ROOM_middle", "ROOM_tip"}));
-  EXPECT_EQ(source.find("ROOM_tip"), 2U);
-  EXPECT_EQ(source.find("ROOM"), std::nullopt);
-  const MarkerFrameSettings plates[] = {transport.bodies.base_plate,
-                                        transport.bodies.segment_plates[0],
-                                        transport.bodies.segment_plates[1]};
+  ASSERT_EQ(source.channels(), (std::vector<std::string>{"LAB_base", "LAB_middle", "LAB_tip"}));
+  EXPECT_EQ(source.find("LAB_tip"), 2U);
+  EXPECT_EQ(source.find("LAB"), std::nullopt);
+  const MarkerFrameSettings marker_frames[] = {transport.bodies.base_marker_frame,
+                                               transport.bodies.segment_marker_frames[0],
+                                               transport.bodies.segment_marker_frames[1]};
   MocapFrame frame;
   for (int trial = 0; trial < 20; ++trial) {
     const std::int64_t arrival_ns = 1'000'000'000 + 5'000'000 * trial;
@@ -144,7 +145,7 @@ TEST(MocapSource, BodiesOnChannelsOfTheirOwnBecomeOneFrame) {
       truth[i] = random_pose(random);
       rigid_transform_t message{};
       message.utime = 5000 * trial;
-      write(sent(truth[i], plates[i], transport.mocap.axes), message.trans, message.quat);
+      write(sent(truth[i], marker_frames[i], transport.mocap.axes), message.trans, message.quat);
       if (trial == 7 && i == 1) continue;
       const MocapReceipt receipt = source.take(i, encoded(message), arrival_ns, frame);
       ASSERT_EQ(receipt, i == 2 && trial != 7 ? MocapReceipt::frame : MocapReceipt::nothing);
@@ -170,7 +171,7 @@ TEST(MocapSource, AFixedBaseNeedsNoChannel) {
   TransportSettings transport = foreign("rigid_transform", random);
   transport.bodies.base_id = -1;
   MocapSource source(transport, {}, two_segments());
-  ASSERT_EQ(source.channels(), (std::vector<std::string>{"ROOM_middle", "ROOM_tip"}));
+  ASSERT_EQ(source.channels(), (std::vector<std::string>{"LAB_middle", "LAB_tip"}));
   rigid_transform_t message{};
   message.quat[3] = 1.0;
   MocapFrame frame;

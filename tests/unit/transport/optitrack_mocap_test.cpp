@@ -150,7 +150,7 @@ TEST_F(OptitrackDecoding, HostileLengthsAreRefusedWhereverTheyStand) {
     }
 }
 
-TEST_F(OptitrackDecoding, MoreBodiesThanThereIsRoomForAreRefused) {
+TEST_F(OptitrackDecoding, MoreBodiesThanFitAreRefused) {
   optitrack_frame_t many{};
   many.rigid_bodies.assign(SentFrame::kMostBodies, body(1, 0));
   many.num_rigid_bodies = static_cast<int>(many.rigid_bodies.size());

@@ -11,6 +11,7 @@
 #include <thread>
 
 #include "counted_malloc.hpp"
+#include "own_url.hpp"
 #include "softarm/base/clock.hpp"
 #include "softarm/transport/message_decoding.hpp"
 
@@ -50,7 +51,7 @@ class ValvesLoopOverUdp : public ::testing::Test {
     // A machine that is busy with other things must not look like a fault of the hardware.
     settings.driver.failsafe_timeout_s = 5.0;
     settings.longest_validity_s = 5.0;
-    lcm.url = "udpm://239.255.76.67:" + std::to_string(20000 + getpid() % 12000) + "?ttl=0";
+    lcm.url = test::own_url();
     bar = Eigen::VectorXd::Zero(3);
     command.num_chambers = 3;
     command.validity_us = 5'000'000;

@@ -305,7 +305,7 @@ void Scene::run(const std::function<void(const std::string&)>& progress) {
     load.push_back(std::make_unique<ForkedPeer>([] {
       while (true) std::atomic_signal_fence(std::memory_order_seq_cst);  // busy
     }));
-  // In a thread of its own: SCHED_FIFO is not for the rest of this program.
+  // In a separate thread: SCHED_FIFO is not for the rest of this program.
   std::string problem;
   std::thread([&] {
     apply_realtime_settings({.fifo = result_.fifo, .priority = kDriverPriority});

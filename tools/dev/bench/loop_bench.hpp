@@ -41,7 +41,7 @@ struct LoopScene {
   Durations bare_lateness{}, lateness{};     ///< of wake-ups after their deadline
   std::int64_t bare_missed = 0, missed = 0;  ///< deadlines
   std::int64_t missed_asleep = 0;  ///< of the daemon's: before it woke, as all of the bare sleep's
-  double stolen_s = 0.0;           ///< processor time the host gave to others; NaN: not told
+  double stolen_s = 0.0;           ///< processor time the host gave to others; NaN: not known
   std::int64_t unanswered = 0;     ///< frames without a command, requests without an echo
 
   double round_trip_p50_ratio() const { return command.p50_us / echo.p50_us; }

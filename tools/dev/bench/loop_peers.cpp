@@ -32,7 +32,7 @@ ForkedPeer::ForkedPeer(const std::function<void()>& body) : pid_(fork()) {
   for (const int number : {SIGTERM, SIGINT, SIGHUP}) ::signal(number, SIG_DFL);
   try {
     body();
-  } catch (...) {  // told by whoever waits for an answer in vain
+  } catch (...) {  // the process that waits for an answer reports that none came
   }
   _exit(1);
 }
@@ -66,7 +66,7 @@ SharedWakeUps::SharedWakeUps(std::size_t capacity)
     : bytes_(sizeof(State) + capacity * sizeof(std::int64_t)), capacity_(capacity) {
   void* const memory = mmap(nullptr, bytes_, PROT_READ | PROT_WRITE,
                             MAP_SHARED | MAP_ANONYMOUS | MAP_POPULATE, -1, 0);
-  if (memory == MAP_FAILED) throw std::runtime_error("no shared memory to be had");
+  if (memory == MAP_FAILED) throw std::runtime_error("no shared memory");
   state_ = new (memory) State;
   lateness_ns_ = reinterpret_cast<std::int64_t*>(state_ + 1);
 }

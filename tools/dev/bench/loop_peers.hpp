@@ -16,7 +16,7 @@ namespace softarm {
 /// its owner.
 class ForkedPeer {
  public:
-  /// @throws std::runtime_error if there is no process to be had
+  /// @throws std::runtime_error if no process can be started
   explicit ForkedPeer(const std::function<void()>& body);
   ~ForkedPeer();
   ForkedPeer(const ForkedPeer&) = delete;
@@ -38,7 +38,7 @@ inline constexpr const char* kEchoAnswer = "SOFTARM_BENCH_COMMAND";
 /// Wake-ups of a bare clock_nanosleep at a fixed rate, in memory that two processes share.
 class SharedWakeUps {
  public:
-  /// Room for so many wake-ups. @throws std::runtime_error without memory
+  /// Capacity for so many wake-ups. @throws std::runtime_error without memory
   explicit SharedWakeUps(std::size_t capacity);
   ~SharedWakeUps();
   SharedWakeUps(const SharedWakeUps&) = delete;

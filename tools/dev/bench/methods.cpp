@@ -10,7 +10,7 @@
 namespace softarm {
 namespace {
 
-/// Beyond this KDL's O(n^2) matrices take a tenth of a second a call and say nothing new.
+/// Beyond this KDL's O(n^2) matrices take a tenth of a second a call and add no information.
 constexpr int kKdlMatricesUpTo = 50;
 
 class Augmented : public Evaluator {
@@ -121,7 +121,9 @@ const char* name(Route route) noexcept {
   return "";
 }
 
-const char* coordinates(const Method& method) noexcept { return method.polar ? "polar" : "u"; }
+const char* coordinates(const Method& method) noexcept {
+  return method.extensible ? "ue" : method.polar ? "polar" : "u";
+}
 
 const char* name(MassModel mass) noexcept {
   return mass == MassModel::point ? "point" : "distributed";
@@ -155,6 +157,7 @@ ControllerSettings bench_controller(const Method& method, int segments) {
 std::unique_ptr<Evaluator> make_evaluator(const Method& method, ArmParameters arm,
                                           const ControllerSettings& settings) {
   arm.mass = method.mass;
+  arm.extensible = method.extensible;
   switch (method.route) {
     case Route::augmented:
       return std::make_unique<Augmented>(arm);

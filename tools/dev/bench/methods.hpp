@@ -24,6 +24,7 @@ struct Method {
   Route route = Route::matrices;
   bool polar = false;
   MassModel mass = MassModel::point;
+  bool extensible = false;  ///< segments stretch: direct routes in (u, e)
 
   bool operator==(const Method&) const = default;
 };
@@ -54,7 +55,7 @@ class Evaluator {
   MethodResult result_;
 };
 
-/// @param arm its mass model is overruled by the method's.
+/// @param arm its mass model and whether it stretches are overruled by the method's.
 std::unique_ptr<Evaluator> make_evaluator(const Method& method, ArmParameters arm,
                                           const ControllerSettings& settings);
 

@@ -1,4 +1,4 @@
-// softarm-dev bench model: what is measured, and how it is told.
+// softarm-dev bench model: what is measured, and how it is reported.
 #pragma once
 
 #include <functional>

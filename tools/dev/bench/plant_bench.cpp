@@ -21,7 +21,7 @@ Trial trial_of(IntegratorMethod method, double tolerance, double absolute = 0.0)
           .plain_cvode = false};
 }
 
-/// What a configuration gets that says nothing of the integrator.
+/// The integrator that a configuration gets by default.
 Trial default_trial() {
   const PlantSettings settings;
   return {.label = "default",

@@ -196,7 +196,7 @@ Experiment robustness_experiment(const RobustnessScene& scene, RobustnessLaw law
       e.estimation.model_observer.learn_parameters = law == RobustnessLaw::observer_parameters;
       e.control.kp = observer.control.kp;
       e.control.kd = observer.control.kd;
-      // Without a lag there is nothing that K_D could damp, and less room for it.
+      // Without a lag there is nothing that K_D could damp, and its bound is tighter.
       if (scene.nominal) std::fill(e.control.kd.begin(), e.control.kd.end(), 0.01);
       break;
     }

@@ -45,9 +45,33 @@ ReferenceSample reference_sample(Draw& draw, int segments) {
   return r;
 }
 
+/// [u_x, u_y] to [u_x, u_y, e] of every segment.
+void add_elongations(BenchInputs& inputs) {
+  inputs.arm.extensible = true;
+  std::mt19937 engine(1);
+  const auto add = [&engine](auto& v, double bound) {
+    std::uniform_real_distribution<double> elongation(-bound, bound);
+    const Eigen::VectorXd u = v;
+    v.resize(u.size() / 2 * 3);
+    for (Eigen::Index i = 0; i < u.size() / 2; ++i) {
+      v.template segment<3>(3 * i) << u(2 * i), u(2 * i + 1), elongation(engine);
+    }
+  };
+  constexpr double kElongation = 0.03, kSpeed = 0.1, kAcceleration = 1.0;
+  for (BenchState& s : inputs.states) {
+    ReferenceSample& r = s.reference.now;
+    add(s.u, kElongation);
+    add(r.u, kElongation);
+    add(s.velocity, kSpeed);
+    add(r.velocity, kSpeed);
+    add(s.acceleration, kAcceleration);
+    add(r.acceleration, kAcceleration);
+  }
+}
+
 }  // namespace
 
-BenchInputs bench_inputs(int segments) {
+BenchInputs bench_inputs(int segments, bool extensible) {
   constexpr unsigned kSeed = 20190414;
   Draw draw(kSeed + static_cast<unsigned>(segments));
   BenchInputs inputs;
@@ -63,6 +87,7 @@ BenchInputs bench_inputs(int segments) {
     polar_acceleration_to_u(s.q, s.q_velocity, s.q_acceleration, s.acceleration);
     s.reference.now = reference_sample(draw, segments);
   }
+  if (extensible) add_elongations(inputs);
   return inputs;
 }
 

@@ -40,7 +40,7 @@ constexpr std::array kFaults{
                      "the second one is dropped; ACTIVE"},
     FaultDescription{"reorder", FaultKind::reorder, "of every two frames the second comes first",
                      "", 0.0, "the older one is dropped; ACTIVE"},
-    FaultDescription{"restart", FaultKind::restart, "frame numbers begin anew, once", "", 0.0,
+    FaultDescription{"restart", FaultKind::restart, "frame numbers begin again, once", "", 0.0,
                      "VENT (sender_restarted)"},
     FaultDescription{"delay", FaultKind::delay, "frames come late", "by how much (s)", 0.2,
                      "compensated up to daemon.safety.max_latency_s, stale beyond it"},
@@ -82,7 +82,7 @@ void FaultInjector::set(const Fault& fault) {
   restart_ = fault.kind == FaultKind::restart;
 }
 
-void FaultInjector::spoil_body(mocap_body_t& body) const {
+void FaultInjector::corrupt_body(mocap_body_t& body) const {
   switch (fault_.kind) {
     case FaultKind::occlude:
       body.valid = 0;
@@ -123,11 +123,11 @@ void FaultInjector::bend_to_other_side(mocap_frame_t& frame) const {
   lower.orientation[3] = q.z();
 }
 
-void FaultInjector::spoil_poses(mocap_frame_t& frame) {
+void FaultInjector::corrupt_poses(mocap_frame_t& frame) {
   const auto size = static_cast<int>(frame.bodies.size());
   if (size == 0) return;
   const int which = std::clamp(fault_.body, 0, size - 1);
-  spoil_body(frame.bodies[static_cast<std::size_t>(which)]);
+  corrupt_body(frame.bodies[static_cast<std::size_t>(which)]);
   if (fault_.kind == FaultKind::swap)
     std::swap(frame.bodies[static_cast<std::size_t>(which)].id,
               frame.bodies[static_cast<std::size_t>((which + 1) % size)].id);
@@ -143,14 +143,14 @@ void FaultInjector::spoil_poses(mocap_frame_t& frame) {
 void FaultInjector::take(const mocap_frame_t& sent, std::int64_t now_ns) {
   ++taken_;
   mocap_frame_t frame = sent;
-  if (sent.frame_number < newest_number_) number_offset_ = 0;  // the sender itself begins anew
+  if (sent.frame_number < newest_number_) number_offset_ = 0;  // the sender itself restarted
   newest_number_ = sent.frame_number;
   if (std::exchange(restart_, false)) number_offset_ = 1 - frame.frame_number;
   frame.frame_number += number_offset_;
   if (fault_.kind == FaultKind::stop) return;
   if (fault_.kind == FaultKind::clock)
     frame.capture_time_us += static_cast<std::int64_t>(1e6 * fault_.amount);
-  spoil_poses(frame);
+  corrupt_poses(frame);
   const double delay_s = fault_.kind == FaultKind::delay ? fault_.amount : 0.0;
   const std::int64_t due_ns = now_ns + to_ns(delay_s);
   if (fault_.kind == FaultKind::reorder && !kept_) {

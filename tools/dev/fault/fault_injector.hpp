@@ -28,7 +28,7 @@ enum class FaultKind {
   swap,        ///< `body` and the next one exchange their ids
   duplicate,   ///< every frame comes twice
   reorder,     ///< of every two frames the second comes first
-  restart,     ///< numbers begin anew at 1, once
+  restart,     ///< numbers begin again at 1, once
   delay,       ///< frames come late
   freeze,      ///< poses repeat, numbers and times go on
   clock,       ///< the sender's clock is set
@@ -66,12 +66,12 @@ class FaultInjector {
 
   /// Takes a frame as it was sent.
   void take(const softarm_messages::mocap_frame_t& frame, std::int64_t now_ns);
-  /// The next frame that is due by `now_ns`, spoilt; false where there is none.
+  /// The next frame that is due by `now_ns`, corrupted; false where there is none.
   bool next(std::int64_t now_ns, softarm_messages::mocap_frame_t& frame);
   /// When the next one is due; kForever where none waits.
   std::int64_t next_due_ns() const;
 
-  /// Spoils measured pressures; false: they do not go through.
+  /// Corrupts measured pressures; false: they do not go through.
   bool pass(softarm_messages::pressure_measurement_t& measurement) const;
 
  private:
@@ -79,9 +79,9 @@ class FaultInjector {
     softarm_messages::mocap_frame_t frame;
     std::int64_t due_ns;
   };
-  void spoil_body(softarm_messages::mocap_body_t& body) const;
+  void corrupt_body(softarm_messages::mocap_body_t& body) const;
   void bend_to_other_side(softarm_messages::mocap_frame_t& frame) const;
-  void spoil_poses(softarm_messages::mocap_frame_t& frame);
+  void corrupt_poses(softarm_messages::mocap_frame_t& frame);
 
   Fault fault_;
   std::deque<Waiting> waiting_;

@@ -1,5 +1,5 @@
 // Stands between sensors and daemon: what the sensors publish on channels with a suffix goes on,
-// spoilt, to the channels the daemon listens to.
+// corrupted, to the channels the daemon listens to.
 #pragma once
 
 #include <atomic>
@@ -17,7 +17,7 @@ namespace softarm {
 
 inline constexpr const char* kSensorSuffix = "_CLEAN";
 
-/// Works in a thread of its own from construction to destruction. A message that cannot be decoded
+/// Works in a separate thread from construction to destruction. A message that cannot be decoded
 /// does not go through.
 class FaultRelay {
  public:

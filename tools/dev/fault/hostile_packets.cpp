@@ -30,7 +30,7 @@ Packet HostilePackets::noise(std::size_t most) {
 }
 
 /// The payload of a message with one fault.
-Packet HostilePackets::spoilt(SampleMessage sample) {
+Packet HostilePackets::corrupted(SampleMessage sample) {
   Packet& bytes = sample.bytes;
   switch (below(5)) {
     case 0: {  // bytes behind it
@@ -91,7 +91,7 @@ Packet HostilePackets::next() {
   if (kind == 0) return broken_header();
   const SampleMessage& sample = samples_[below(samples_.size())];
   if (kind == 1) return lcm_packet(sample.channel, noise(kMost));
-  return lcm_packet(sample.channel, spoilt(sample));
+  return lcm_packet(sample.channel, corrupted(sample));
 }
 
 }  // namespace softarm

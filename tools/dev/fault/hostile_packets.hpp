@@ -8,10 +8,10 @@
 
 namespace softarm {
 
-/// The same packets for the same seed. Each is refused, by LCM, by decode() or by who receives it:
+/// The same packets for the same seed. Each is refused, by LCM, by decode() or by the receiver:
 /// cut off, with bytes behind it, of another type, with a wrong count, of random bytes, with a
-/// broken LCM header or channel name, or with a number that is none. Left out are fragments, for
-/// what they do to LCM 1.3.1, and frames that are well-formed and lie: those are frame faults
+/// broken LCM header or channel name, or with NaN. Left out are fragments, because of
+/// what they do to LCM 1.3.1, and well-formed frames with wrong numbers: those are frame faults
 /// (fault_injector.hpp).
 class HostilePackets {
  public:
@@ -22,7 +22,7 @@ class HostilePackets {
  private:
   std::size_t below(std::size_t end);
   Packet noise(std::size_t most);
-  Packet spoilt(SampleMessage sample);
+  Packet corrupted(SampleMessage sample);
   Packet broken_header();
 
   std::vector<SampleMessage> samples_;

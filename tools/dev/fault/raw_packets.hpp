@@ -20,7 +20,7 @@ using Packet = std::vector<std::byte>;
 /// time to live of 0: nothing leaves the machine.
 class RawSender {
  public:
-  /// @throws TransportError for another kind of URL or where there is no socket to be had
+  /// @throws TransportError for another kind of URL or if no socket can be opened
   explicit RawSender(const std::string& url);
   ~RawSender();
   RawSender(const RawSender&) = delete;
@@ -36,7 +36,7 @@ class RawSender {
 /// A packet that LCM takes for a message of these bytes on this channel.
 Packet lcm_packet(const std::string& channel, std::span<const std::byte> payload);
 
-/// A good message of a channel, and where it may be spoilt.
+/// A good message of a channel, and where it may be corrupted.
 struct SampleMessage {
   std::string channel;
   Packet bytes;

@@ -27,15 +27,18 @@ struct Functions {
   }
 };
 
+/// Columns of one segment along u_x, u_y and its length; the last is only for arms that stretch.
+using Columns = std::array<Triple, 3>;
+
 /// A piece of arc of length L bent by u, in the axes of its base.
 struct Piece {
   Rotation R;
   Triple tip;
-  std::array<Triple, 2> tip_column;      ///< d tip / d u_a
-  std::array<Triple, 2> angular_column;  ///< omega for unit u_a'
+  Columns tip_column;
+  Columns angular_column;  ///< omega for unit rates
 };
 
-Piece piece(Real length, Dual ux, Dual uy) {
+Piece piece(Dual length, Dual ux, Dual uy) {
   const Functions f(ux * ux + uy * uy);
   const auto& c = f.c;
   const std::array<Dual, 2> u{ux, uy};
@@ -48,7 +51,7 @@ Piece piece(Real length, Dual ux, Dual uy) {
   for (std::size_t a = 0; a < 2; ++a) {
     const Dual stretch = Real(2) * (f.slope[2] * u[a]);
     p.tip_column[a] = {length * (stretch * ux), length * (stretch * uy),
-                       Real(2) * length * (f.slope[1] * u[a])};
+                       Real(2) * (length * (f.slope[1] * u[a]))};
     p.tip_column[a][a] = p.tip_column[a][a] + length * c[2];
     // c1 w' + c3 w (w.w') and c2 (u1 u2' - u2 u1') for u' = e_a, w = (-u2, u1).
     const Dual turn = c[3] * u[a];
@@ -56,50 +59,56 @@ Piece piece(Real length, Dual ux, Dual uy) {
     p.angular_column[a][a == 0 ? 1 : 0] =
         p.angular_column[a][a == 0 ? 1 : 0] + (a == 0 ? c[1] : -c[1]);
   }
+  p.tip_column[2] = {c[2] * ux, c[2] * uy, c[1]};
   return p;
 }
 
 /// The centre of mass of an arc, L (c3 u, c2), and its columns.
 struct Centre {
   Triple point;
-  std::array<Triple, 2> column;
+  Columns column;
 };
 
-Centre centre(Real length, Dual ux, Dual uy) {
+Centre centre(Dual length, Dual ux, Dual uy) {
   const Functions f(ux * ux + uy * uy);
   const std::array<Dual, 2> u{ux, uy};
   Centre m{{length * (f.c[3] * ux), length * (f.c[3] * uy), length * f.c[2]}, {}};
   for (std::size_t a = 0; a < 2; ++a) {
     const Dual stretch = Real(2) * (f.slope[3] * u[a]);
     m.column[a] = {length * (stretch * ux), length * (stretch * uy),
-                   Real(2) * length * (f.slope[2] * u[a])};
+                   Real(2) * (length * (f.slope[2] * u[a]))};
     m.column[a][a] = m.column[a][a] + length * f.c[3];
   }
+  m.column[2] = {f.c[3] * ux, f.c[3] * uy, f.c[2]};
   return m;
 }
 
 /// A segment with its base's axes and its columns in the axes of the whole arm's base.
 struct Segment {
-  Dual ux, uy;
+  Dual ux, uy, length;
   Rotation base;
   Triple tip;
-  std::array<Triple, 2> tip_column, angular_column;
+  Columns tip_column, angular_column;
 };
 
 struct Arm {
+  std::size_t width;  ///< coordinates a segment
   std::vector<Segment> segments;
   Rotation end;  ///< of the last segment
 
   Arm(const ArmParameters& arm, const Vector& u, const Vector& velocity)
-      : end(constant(Matrix3::Identity())) {
+      : width(static_cast<std::size_t>(arm.segment_dof())), end(constant(Matrix3::Identity())) {
     for (int i = 0; i < arm.size(); ++i) {
+      const int first = arm.segment_dof() * i;
       Segment s;
-      s.ux = {u(2 * i), velocity(2 * i)};
-      s.uy = {u(2 * i + 1), velocity(2 * i + 1)};
+      s.ux = {u(first), velocity(first)};
+      s.uy = {u(first + 1), velocity(first + 1)};
+      s.length = {arm.segments[static_cast<std::size_t>(i)].length_m, 0};
+      if (arm.extensible) s.length = s.length + Dual{u(first + 2), velocity(first + 2)};
       s.base = end;
-      const Piece p = piece(arm.segments[static_cast<std::size_t>(i)].length_m, s.ux, s.uy);
+      const Piece p = piece(s.length, s.ux, s.uy);
       s.tip = end * p.tip;
-      for (std::size_t a = 0; a < 2; ++a) {
+      for (std::size_t a = 0; a < width; ++a) {
         s.tip_column[a] = end * p.tip_column[a];
         s.angular_column[a] = end * p.angular_column[a];
       }
@@ -112,8 +121,8 @@ struct Arm {
   /// from the nearest segment, so that unequal lengths lose nothing.
   void ancestors(std::size_t m, Triple lever, std::vector<Triple>& columns) const {
     for (std::size_t j = m; j-- > 0;) {
-      for (std::size_t a = 0; a < 2; ++a) {
-        columns[2 * j + a] =
+      for (std::size_t a = 0; a < width; ++a) {
+        columns[width * j + a] =
             cross(segments[j].angular_column[a], lever) + segments[j].tip_column[a];
       }
       lever = lever + segments[j].tip;
@@ -141,40 +150,41 @@ void add_mass(Real mass, std::size_t dof, const std::vector<Triple>& columns, co
 class SegmentMasses {
  public:
   SegmentMasses(const Arm& arm, const Vector3& gravity, Dynamics& out)
-      : arm_(arm), gravity_(gravity), out_(out), columns_(2 * arm.segments.size()) {}
+      : arm_(arm), gravity_(gravity), out_(out), columns_(arm.width * arm.segments.size()) {}
 
-  void point(std::size_t m, Real mass, Real length) {
+  void point(std::size_t m, Real mass) {
     const Segment& s = arm_.segments[m];
-    const Centre c = centre(length, s.ux, s.uy);
-    add(m, mass, s.base * c.point, {s.base * c.column[0], s.base * c.column[1]});
+    const Centre c = centre(s.length, s.ux, s.uy);
+    add(m, mass, c.point, c.column);
   }
 
-  void node(std::size_t m, Real mass, Real length, Real x, Real radius) {
+  void node(std::size_t m, Real mass, Real x, Real radius) {
     const Segment& s = arm_.segments[m];
-    // The first x of an arc is an arc of length x L bent by x u.
-    const Piece p = piece(x * length, x * s.ux, x * s.uy);
+    // The first x of an arc is an arc of length x l bent by x u.
+    const Piece p = piece(x * s.length, x * s.ux, x * s.uy);
     if (radius == 0) {
-      add(m, mass, s.base * p.tip,
-          {s.base * (x * p.tip_column[0]), s.base * (x * p.tip_column[1])});
+      add(m, mass, p.tip, {x * p.tip_column[0], x * p.tip_column[1], x * p.tip_column[2]});
       return;
     }
     const Real ring = radius / std::sqrt(Real(2));
     for (const auto& [dx, dy] : {std::array<Real, 2>{ring, 0}, {-ring, 0}, {0, ring}, {0, -ring}}) {
       const Triple offset = p.R * Triple{Dual{dx, 0}, Dual{dy, 0}, Dual{}};
-      std::array<Triple, 2> own;
-      for (std::size_t a = 0; a < 2; ++a) {
-        own[a] = s.base * (x * (p.tip_column[a] + cross(p.angular_column[a], offset)));
+      Columns own;
+      for (std::size_t a = 0; a < own.size(); ++a) {
+        own[a] = x * (p.tip_column[a] + cross(p.angular_column[a], offset));
       }
-      add(m, mass / 4, s.base * (p.tip + offset), own);
+      add(m, mass / 4, p.tip + offset, own);
     }
   }
 
  private:
-  void add(std::size_t m, Real mass, const Triple& lever, const std::array<Triple, 2>& own) {
-    columns_[2 * m] = own[0];
-    columns_[2 * m + 1] = own[1];
-    arm_.ancestors(m, lever, columns_);
-    add_mass(mass, 2 * m + 2, columns_, gravity_, out_);
+  /// A mass at `lever` from the base of segment m, in the segment's axes.
+  void add(std::size_t m, Real mass, const Triple& lever, const Columns& own) {
+    const std::size_t first = arm_.width * m;
+    const Rotation& base = arm_.segments[m].base;
+    for (std::size_t a = 0; a < arm_.width; ++a) columns_[first + a] = base * own[a];
+    arm_.ancestors(m, base * lever, columns_);
+    add_mass(mass, first + arm_.width, columns_, gravity_, out_);
   }
 
   const Arm& arm_;
@@ -251,19 +261,20 @@ Kinematics kinematics(const ArmParameters& arm, const Vector& u, const Vector& v
   Vector3 position = arm.base_position_m.cast<Real>();
   for (std::size_t i = 0; i < n; ++i) {
     const Segment& s = chain.segments[i];
-    const Centre own = centre(arm.segments[i].length_m, s.ux, s.uy);
+    const Centre own = centre(s.length, s.ux, s.uy);
     out.centres.col(static_cast<Eigen::Index>(i)) = position + base * values(s.base * own.point);
     position += base * values(s.tip);
     out.positions.push_back(position);
     out.rotations.push_back(base * values(i + 1 < n ? chain.segments[i + 1].base : chain.end));
   }
-  std::vector<Triple> columns(2 * n);
+  std::vector<Triple> columns(chain.width * n);
   chain.ancestors(n, Triple{}, columns);
-  for (std::size_t k = 0; k < 2 * n; ++k) {
+  for (std::size_t k = 0; k < columns.size(); ++k) {
     const auto col = static_cast<Eigen::Index>(k);
     out.jacobian.col(col) = base * values(columns[k]);
     out.jacobian_rate.col(col) = base * rates(columns[k]);
-    out.angular_jacobian.col(col) = base * values(chain.segments[k / 2].angular_column[k % 2]);
+    out.angular_jacobian.col(col) =
+        base * values(chain.segments[k / chain.width].angular_column[k % chain.width]);
   }
   return out;
 }
@@ -280,16 +291,16 @@ Dynamics dynamics(const ArmParameters& arm, const Vector& u, const Vector& veloc
   SegmentMasses masses(chain, gravity, out);
   Real total = 0;
   for (std::size_t m = 0; m < chain.segments.size(); ++m) {
-    const Real mass = arm.segments[m].mass_kg, length = arm.segments[m].length_m;
+    const Real mass = arm.segments[m].mass_kg;
     total += mass;
     if (arm.mass == MassModel::point) {
-      masses.point(m, mass, length);
+      masses.point(m, mass);
       continue;
     }
     const Segment& s = chain.segments[m];
     const Quadrature& rule = gauss_legendre(nodes_for(std::hypot(s.ux.v, s.uy.v)) + extra_nodes);
     for (std::size_t k = 0; k < rule.node.size(); ++k) {
-      masses.node(m, mass * rule.weight[k], length, rule.node[k],
+      masses.node(m, mass * rule.weight[k], rule.node[k],
                   static_cast<Real>(arm.segments[m].radius_m));
     }
   }
@@ -305,7 +316,7 @@ Dynamics dynamics(const ArmParameters& arm, const Vector& u, const Vector& veloc
   Real reach = arm.base_position_m.cast<Real>().norm();
   for (int i = 0; i < arm.size(); ++i) {
     const SegmentParameters& segment = arm.segments[static_cast<std::size_t>(i)];
-    reach += segment.length_m;
+    reach += chain.segments[static_cast<std::size_t>(i)].length.v;
     out.gravity_potential -= segment.mass_kg * weight.dot(centres.col(i));
     out.potential_scale += segment.mass_kg * weight.norm() * reach;
   }
@@ -323,9 +334,10 @@ Vector inverse_dynamics_scale(const Dynamics& terms, const Vector& b, const Vect
 Vector impedance(const ArmParameters& arm, const Vector& u, const Vector& velocity) {
   Vector out(arm.dof());
   for (int i = 0; i < arm.dof(); ++i) {
-    const SegmentParameters& s = arm.segments[static_cast<std::size_t>(i / 2)];
-    out(i) = static_cast<Real>(s.stiffness_nm_per_rad) * u(i) +
-             static_cast<Real>(s.damping_nms_per_rad) * velocity(i);
+    const SegmentParameters& s = arm.segments[static_cast<std::size_t>(i / arm.segment_dof())];
+    const bool axial = i % arm.segment_dof() == 2;
+    out(i) = Real(axial ? s.axial_stiffness_n_per_m : s.stiffness_nm_per_rad) * u(i) +
+             Real(axial ? s.axial_damping_ns_per_m : s.damping_nms_per_rad) * velocity(i);
   }
   return out;
 }
@@ -340,43 +352,6 @@ Vector forward_dynamics(const ArmParameters& arm, const Dynamics& terms, const V
   }
   const Vector rhs = generalized_force - terms.C * velocity - terms.G - impedance(arm, u, velocity);
   return inverse.cwiseProduct(Vector(factor.solve(inverse.cwiseProduct(rhs))));
-}
-
-Vector polar_to_u(const Vector& q) {
-  Vector u(q.size());
-  for (Eigen::Index i = 0; i < q.size(); i += 2) {
-    u(i) = q(i + 1) * std::cos(q(i));
-    u(i + 1) = q(i + 1) * std::sin(q(i));
-  }
-  return u;
-}
-
-Vector polar_velocity_to_u(const Vector& q, const Vector& velocity) {
-  Vector v(q.size());
-  for (Eigen::Index i = 0; i < q.size(); i += 2) {
-    const Real c = std::cos(q(i)), s = std::sin(q(i)), turn = q(i + 1) * velocity(i);
-    v(i) = velocity(i + 1) * c - turn * s;
-    v(i + 1) = velocity(i + 1) * s + turn * c;
-  }
-  return v;
-}
-
-Dynamics to_polar(const Dynamics& terms, const Vector& q, const Vector& velocity) {
-  Matrix P = Matrix::Zero(q.size(), q.size()), rate = P;
-  Dynamics out = terms;
-  for (Eigen::Index i = 0; i < q.size(); i += 2) {
-    const Real c = std::cos(q(i)), s = std::sin(q(i)), theta = q(i + 1);
-    const Real phi_rate = velocity(i), theta_rate = velocity(i + 1);
-    P.block<2, 2>(i, i) << -theta * s, c, theta * c, s;
-    rate.block<2, 2>(i, i) << -theta_rate * s - theta * phi_rate * c, -phi_rate * s,
-        theta_rate * c - theta * phi_rate * s, phi_rate * c;
-  }
-  out.B = P.transpose() * terms.B * P;
-  out.C = P.transpose() * (terms.B * rate + terms.C * P);
-  out.G = P.transpose() * terms.G;
-  out.s = P.cwiseAbs().transpose() * terms.s;
-  out.r = rate.cwiseAbs().transpose() * terms.s + P.cwiseAbs().transpose() * terms.r;
-  return out;
 }
 
 }  // namespace softarm::reference

@@ -5,8 +5,9 @@
 // rates come from dual numbers, and B = sum mu J'J, C = sum mu J' J-dot, G = -sum mu J' g are taken
 // literally. Distributed mass is a Gauss-Legendre rule along the arc, the rotary inertia of a thin
 // disc four points on a ring of radius r / sqrt 2 around each node. The entire functions are plain
-// sums of their series. Coordinates are u; `to_polar` applies the chain rule. All of it is good to
-// about 1e-17 relative to the scales below for theta up to 8, and allocates as it pleases.
+// sums of their series. Coordinates are u, or [u_x, u_y, e] where the arm stretches: 2n below is
+// then 3n. `to_polar` applies the chain rule. All of it is good to about 1e-17 relative to the
+// scales below for theta up to 8, and allocates as it pleases.
 #pragma once
 
 #include <Eigen/Core>

@@ -28,21 +28,22 @@ class SoakArm {
   /// @throws TransportError
   explicit SoakArm(const Experiment& experiment);
 
-  /// Handles messages and speaks until `reached`, or `patience_s` have passed; says which.
+  /// Handles messages and sends references and the dead-man input until `reached`, or until
+  /// `patience_s` have passed. Returns whether it was reached.
   bool wait_for(const std::function<bool()>& reached, double patience_s);
 
   /// An operator's request, sent once.
   void request(OperatorRequest what) { client_.send(what); }
-  /// What the dead man says from now on.
+  /// The dead-man input from now on.
   enum class DeadMan { go, let_go, silent };
-  void set_dead_man(DeadMan says) { dead_man_ = says; }
+  void set_dead_man(DeadMan input) { dead_man_ = input; }
 
   Mode mode() const { return status_.mode; }
   Reason reason() const { return status_.reason; }
   const ArmStatus& status() const { return status_; }
-  /// Statuses in a row, up to the newest, that say ACTIVE.
+  /// ACTIVE statuses in a row, up to the newest.
   int active_in_row() const { return active_in_row_; }
-  void count_active_anew() { active_in_row_ = 0; }
+  void reset_active_count() { active_in_row_ = 0; }
   bool plant_vented() const { return client_.plant() && client_.plant()->vented; }
   /// The chamber with the highest commanded pressure, and that pressure.
   int fullest_chamber() const;

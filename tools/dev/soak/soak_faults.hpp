@@ -9,13 +9,13 @@
 
 namespace softarm {
 
-/// Who makes it.
+/// What makes it.
 enum class SoakAction {
   relay,   ///< the fault injector between sensors and daemon, by `SoakFault::relay_fault`
   disarm,  ///< an operator
   emergency_stop,
-  let_go,        ///< the dead-man input says so
-  fall_silent,   ///< the dead-man input says nothing
+  let_go,        ///< the dead-man input is withdrawn
+  fall_silent,   ///< the dead-man input is not sent
   hostile,       ///< bytes that are no message
   flood,         ///< the same, as fast as they can be sent
   pause_daemon,  ///< SIGSTOP, for longer than vent_after_s

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <fstream>
 #include <numeric>
 
 #include "apps/program.hpp"
@@ -27,7 +26,7 @@ constexpr double kBurstFrom_bar = 0.5;
 
 std::filesystem::path write_soak_config(const SoakOptions& options) {
   const std::filesystem::path path = options.folder / "soak.yaml";
-  std::ofstream(path) << fmt::format(
+  const std::string text = fmt::format(
       "include: {}\nname: soak\nseed: {}\n"
       "reference: [{{kind: live, timeout_s: 1}}]\n"
       "daemon:\n"
@@ -38,6 +37,7 @@ std::filesystem::path write_soak_config(const SoakOptions& options) {
       "    valve_readback: true, valve_silence_s: 0.4, deadman_timeout_s: 1.5}}\n"
       "plant: {{mocap: {{rate_hz: 500}}}}\n",
       std::filesystem::absolute(options.config).string(), options.seed, 20000 + getpid() % 12000);
+  write_text(path, text, load_experiment(options.config).files);
   return path;
 }
 
@@ -61,7 +61,7 @@ SoakRun::SoakRun(const SoakOptions& options)
                       "chambers: a soak watches pressures and valves", "torque");
   if (experiment_.transport.mocap.source != softarm_mocap())
     throw ConfigError(options.config, 0, "daemon.mocap.source",
-                      "softarm, the only frames that a soak can spoil", "another source");
+                      "softarm, the only frames that a soak can corrupt", "another source");
   for (const SoakFault& fault : soak_faults()) counters_.faults.push_back({.name = fault.name});
 }
 
@@ -109,7 +109,7 @@ void SoakRun::measure_after_warm_up(double now_s) {
 
 /// What an operator would do: acknowledge a fault, then arm.
 bool SoakRun::operate_until_active(double patience_s) {
-  arm_.count_active_anew();
+  arm_.reset_active_count();
   const double end_s = passed_s() + patience_s;
   const auto active = [&] { return arm_.active_in_row() >= kSteadyStatuses; };
   while (passed_s() < end_s && stop_requested == 0 && !stop_) {

@@ -27,7 +27,7 @@ struct SoakOptions {
 
 /// Writes the soak's own configuration into the folder and returns its path: the experiment with
 /// tick and motion capture at 500 Hz, live references, explicit arming, read-back, a dead-man
-/// input, thresholds that a busy machine does not reach by itself, and a port of its own.
+/// input, thresholds that a busy machine does not reach by itself, and a separate port.
 std::filesystem::path write_soak_config(const SoakOptions& options);
 
 class SoakRun {

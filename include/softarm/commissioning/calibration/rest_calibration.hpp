@@ -15,8 +15,8 @@ namespace softarm {
 
 /// The source of S_0; the shape at rest is relative to it.
 enum class BaseSource {
-  plate,  ///< the body of the base with the configured marker frame (or arm.base if it is fixed)
-  arm     ///< the same position, but with the axis of the arm along arm.base.rotation
+  marker_frame,  ///< that of the base as configured, on its body (or arm.base if it is fixed)
+  arm            ///< the same position, but with the axis of the arm along arm.base.rotation
 };
 
 /// The measured configuration of one segment at rest.

@@ -32,8 +32,8 @@ ArmHypothesis of_plant(const Experiment& experiment);
 
 /// f(u, p): the generalized force of the actuation, 2n, N m.
 /// @param input  pressures behind the valves in bar, or moments in N m
-void push_force(const ArmHypothesis& arm, ConstVectorRef u, const Eigen::VectorXd& input,
-                VectorRef force);
+void actuation_force(const ArmHypothesis& arm, ConstVectorRef u, const Eigen::VectorXd& input,
+                     VectorRef force);
 
 /// The spring force K (u - rest) with its cubic part, 2n, N m.
 void spring_force(const ArmHypothesis& arm, ConstVectorRef u, VectorRef force);

@@ -16,7 +16,7 @@ struct Finding {
   Verdict verdict = Verdict::not_checked;
   std::string text =
       {};  ///< what was measured, with units; what is wrong; or why it was not checked
-  std::string cure = {};  ///< how to fix what failed
+  std::string fix = {};  ///< how to fix what failed
 };
 
 /// Whether any of them failed.

@@ -1,5 +1,5 @@
 // Slow arms without gravity, integrated here by other means: what is sought beyond (16) is found,
-// and halves that differ are told.
+// and halves that differ are reported.
 #include "softarm/commissioning/identification/model_comparison.hpp"
 
 #include <gtest/gtest.h>
@@ -12,20 +12,21 @@
 namespace softarm {
 namespace {
 
-/// An arm that creeps: u' = (input_map - k b - c |b|^2 b) / beta, b = u - rest, behind a lag.
-struct Creeper {
+/// An arm in quasi-static motion behind a lag: u' = (input_map - k b - c |b|^2 b) / beta,
+/// b = u - rest.
+struct QuasiStaticArm {
   double k = 1.0, beta = 0.5, cubic = 0.0, lag_s = 0.0;
   Eigen::Vector2d rest = Eigen::Vector2d::Zero();
   Eigen::Matrix<double, 2, 4> input_map;
 
-  Creeper() {
+  QuasiStaticArm() {
     for (int j = 0; j < 4; ++j) {  // 35 degrees off where they are said to be
       const double angle = 0.6 + M_PI / 2 * j, gain = 0.2 + 0.03 * j;
       input_map.col(j) << -gain * std::cos(angle), -gain * std::sin(angle);
     }
   }
 
-  /// Pressures of three incommensurate periods each, from 1 s on; `gain(t)` scales what they input_map.
+  /// Pressures of three incommensurate periods each, from 1 s on; `gain(t)` scales their moments.
   template <class Gain>
   MotionRecord record(double seconds, const Gain& gain) const {
     constexpr int kSteps = 50;  // of 1 ms, from frame to frame
@@ -92,7 +93,7 @@ IdentifyOptions two_threads() {
 }
 
 TEST(ModelComparison, FindsDirectionsRestLagAndCubicStiffness) {
-  Creeper truth;
+  QuasiStaticArm truth;
   truth.cubic = 5.0;
   truth.lag_s = 0.3;
   truth.rest << 0.05, -0.03;
@@ -131,9 +132,9 @@ TEST(ModelComparison, FindsDirectionsRestLagAndCubicStiffness) {
   EXPECT_EQ(text.find("NOT CONVERGED"), std::string::npos) << text;
 }
 
-TEST(ModelComparison, HalvesThatDifferAreTold) {
+TEST(ModelComparison, HalvesThatDifferAreReported) {
   // In the second half everything pushes twice as much; u is linear in what pushes.
-  const Creeper truth;
+  const QuasiStaticArm truth;
   const MotionRecord record = truth.record(40.0, [](double t) { return t <= 20.0 ? 1.0 : 2.0; });
   const ParameterSet set(configured(slow_arm()), ActuationKind::chambers, slow_choice());
   const CrossValidation found = cross_validate(set, record, two_threads());
@@ -153,9 +154,9 @@ TEST(ModelComparison, HalvesThatDifferAreTold) {
 }
 
 TEST(ModelComparison, ALagThatWouldBeNegativeRestsAtItsLimit) {
-  Creeper truth;
+  QuasiStaticArm truth;
   MotionRecord record = truth.record(30.0);
-  record.input.time_s.array() += 0.1;  // u is ahead of what it is told to follow
+  record.input.time_s.array() += 0.1;  // u is ahead of its input
   FitChoice choice = slow_choice();
   choice.lag = true;
   const ParameterSet set(configured(slow_arm()), ActuationKind::chambers, choice);
@@ -171,7 +172,7 @@ TEST(ModelComparison, ALagThatWouldBeNegativeRestsAtItsLimit) {
 TEST(ModelComparison, InertiaDoesNotCountInSlowMotion) {
   // From beta 0.06 to 0.3 N m s/rad: the search leaves the steps with which it began, which are
   // not stable where it ends.
-  Creeper truth;
+  QuasiStaticArm truth;
   truth.beta = 0.3;
   const MotionRecord record = truth.record(8.0);
   FitChoice choice = slow_choice();

@@ -21,7 +21,7 @@ TEST(Refinement, ExactDataOfThePlantGiveItsParameters) {
   experiment.plant.arm.segments[0].damping_nms_per_rad = 0.025;
   experiment.plant.actuation.segments[0][2].gain_nm_per_bar = 0.9;
   experiment.plant.valves.lag_s = 0.03;
-  // Frames so dense that the response is simulated without an error of its own.
+  // Frames so dense that the response is simulated without a relevant error.
   const MotionRecord record = test::plant_record(experiment, 8, 0.2, 0.2, 2000.0);
   FitChoice choice;
   choice.delay = false;
@@ -109,9 +109,9 @@ TEST(Refinement, IntervalsAreThoseOfTheFisherInformation) {
   const Refinement fit = refine(set, record, set.configured(), options);
   EXPECT_TRUE(fit.converged);
   EXPECT_EQ(fit.held, 0);
-  // The information in the sensitivities. The mass alone tells k from g, through a transient of a
-  // few frames, whose own residuals say little of the noise: the covariance is compared for the
-  // ratio.
+  // The information in the sensitivities. The mass alone distinguishes k from g, through a
+  // transient of a few frames, whose residuals hold little information on the noise: the covariance
+  // is compared for the ratio.
   const Eigen::Matrix3d found =
       fit.combinations * fit.singular_values.array().square().inverse().matrix().asDiagonal() *
       fit.combinations.transpose();
@@ -125,7 +125,7 @@ TEST(Refinement, IntervalsAreThoseOfTheFisherInformation) {
 
 TEST(Refinement, IntervalsHoldTheTruthWhereNoiseIsFiltered) {
   Experiment experiment = one_segment();
-  // So heavy that k, beta and gain are told apart well, and the fit is nearly linear in them.
+  // So heavy that k, beta and gain are well distinguishable, and the fit is nearly linear in them.
   experiment.arm.gravity_mps2.z() = experiment.plant.arm.gravity_mps2.z() = -60.0;
   const MotionRecord exact = test::plant_record(experiment, 8, 0.2, 0.5, 200.0);
   FitChoice choice;
@@ -169,7 +169,7 @@ TEST(Refinement, SaysWhatARecordDoesNotTell) {
   EXPECT_NE(text.find("segment 1 chamber 4"), std::string::npos) << text;
 }
 
-TEST(Refinement, WithoutGravitySlowMotionTellsRatiosOnly) {
+TEST(Refinement, WithoutGravitySlowMotionDeterminesRatiosOnly) {
   Experiment experiment = one_segment();
   experiment.arm.gravity_mps2.setZero();
   MotionRecord record;

@@ -1,5 +1,5 @@
-// Every finding of the pre-flight check, by the mistake it is for: made in what is seen, or in what
-// is configured.
+// Every finding of the pre-run check, each by the mistake that it detects: in what is seen, or in
+// what is configured.
 #include <gtest/gtest.h>
 
 #include "unit/commissioning/preflight/observed.hpp"
@@ -16,7 +16,7 @@ using test::observed;
 ::testing::AssertionResult fails(const std::vector<Finding>& all, const std::string& check,
                                  const std::string& says) {
   const Finding one = finding(all, check);
-  if (one.verdict == Verdict::fail && (one.text + one.cure).find(says) != std::string::npos)
+  if (one.verdict == Verdict::fail && (one.text + one.fix).find(says) != std::string::npos)
     return ::testing::AssertionSuccess();
   return ::testing::AssertionFailure()
          << "expected that " << check << " fails with \"" << says << "\"\n"
@@ -38,7 +38,7 @@ TEST(Preflight, ARightArmPassesEveryCheckWithPulses) {
   EXPECT_EQ(all.size(), 15U);
 }
 
-TEST(Preflight, AtRestItSaysWhatCannotBeTold) {
+TEST(Preflight, AtRestItSaysWhatCannotBeChecked) {
   const Experiment arm = hanging_arm(2);
   const std::vector<Finding> all = checked(arm, observed(arm));
   EXPECT_TRUE(alone(all));
@@ -90,7 +90,7 @@ TEST(Preflight, JitterThatTheDaemonWouldHoldFor) {
   EXPECT_TRUE(alone(checked(arm, seen), "jitter"));
 }
 
-TEST(Preflight, LatencyIsToldOnlyWhereClocksAreOne) {
+TEST(Preflight, LatencyIsReportedOnlyWhereClocksAreOne) {
   const Experiment arm = hanging_arm(1);
   Observation seen = observed(arm);
   Experiment configured = arm;
@@ -221,19 +221,20 @@ TEST(Preflight, AxesOfTheBodies) {
 TEST(Preflight, HandednessShowsWhenTheArmBends) {
   const Experiment arm = hanging_arm(2);
   const Observation right = observed(arm, true);
-  const auto spoilt = [&](const std::function<void(BodyPose&)>& spoil) {
+  const auto corrupted = [&](const std::function<void(BodyPose&)>& corrupt) {
     Observation seen = right;
-    for_each_body(seen, spoil);
+    for_each_body(seen, corrupt);
     return checked(arm, seen);
   };
-  EXPECT_TRUE(fails(spoilt([](BodyPose& body) { body.position_m.y() *= -1.0; }), "handedness",
+  EXPECT_TRUE(fails(corrupted([](BodyPose& body) { body.position_m.y() *= -1.0; }), "handedness",
                     "positions with y reversed"));
-  EXPECT_TRUE(fails(spoilt([](BodyPose& body) { body.position_m.x() *= -1.0; }), "handedness",
+  EXPECT_TRUE(fails(corrupted([](BodyPose& body) { body.position_m.x() *= -1.0; }), "handedness",
                     "positions with x reversed"));
-  EXPECT_TRUE(fails(spoilt([](BodyPose& body) { body.orientation = body.orientation.conjugate(); }),
-                    "handedness", "world to body"));
-  // z tells at rest: the arm would point against its own axis.
-  EXPECT_TRUE(fails(spoilt([](BodyPose& body) { body.position_m.z() *= -1.0; }), "handedness",
+  EXPECT_TRUE(
+      fails(corrupted([](BodyPose& body) { body.orientation = body.orientation.conjugate(); }),
+            "handedness", "world to body"));
+  // z shows already at rest: the arm would point against its own axis.
+  EXPECT_TRUE(fails(corrupted([](BodyPose& body) { body.position_m.z() *= -1.0; }), "handedness",
                     "positions with z reversed"));
 }
 

@@ -13,7 +13,7 @@ namespace softarm::test {
 inline constexpr std::int64_t kMs = 1'000'000;
 inline constexpr std::int64_t kWall_ns = 1'700'000'000'000'000'000;
 
-/// A hanging arm with four chambers a segment, and what the checks are told of it.
+/// A hanging arm with four chambers a segment, and what the checks are given of it.
 inline Experiment hanging_arm(int segments) {
   Experiment experiment;
   experiment.arm.segments.assign(static_cast<std::size_t>(segments), {0.11, 0.15, 0.626, 0.029});
@@ -78,7 +78,9 @@ class Observer {
     for (const std::int64_t end_ns = now_ns_ + time_ns; now_ns_ < end_ns;) {
       now_ns_ += 5 * kMs;
       if (!command_bar_.empty())
-        arm_.command({++sequence_, 100 * kMs, false, command_bar_}, now_ns_);
+        arm_.command(
+            {.sequence = ++sequence_, .validity_ns = 100 * kMs, .pressure_bar = command_bar_},
+            now_ns_);
       arm_.advance_to(now_ns_);
       const auto n = static_cast<std::size_t>(truth_.arm.size());
       for (MocapFrame frame; arm_.receive(frame);)
@@ -103,9 +105,9 @@ inline Observation observed(const Experiment& truth, bool pulses = false) {
   return Observer(truth).observe(pulses);
 }
 
-inline void for_each_body(Observation& seen, const std::function<void(BodyPose&)>& spoil) {
+inline void for_each_body(Observation& seen, const std::function<void(BodyPose&)>& corrupt) {
   for (SeenFrame& frame : seen.frames)
-    for (BodyPose& body : frame.body) spoil(body);
+    for (BodyPose& body : frame.body) corrupt(body);
 }
 
 /// What x, y, z, w makes of numbers that were read as w, x, y, z.
