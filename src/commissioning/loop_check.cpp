@@ -26,7 +26,7 @@ Experiment undisturbed(Experiment e) {
   SafetySettings& safety = e.safety;
   safety.arming = Arming::automatic;
   safety.deadman = safety.valve_readback = false;
-  safety.curvature_residual_nm = safety.oscillation_rad = 0.0;
+  safety.curvature_residual_nm = safety.oscillation_rad = safety.length_fault = 0.0;
   return e;
 }
 

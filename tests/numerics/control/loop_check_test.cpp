@@ -117,7 +117,7 @@ INSTANTIATE_TEST_SUITE_P(
                    e.control.task_space = {6.0, 10.0, 2.0, 0.0};
                  },
                  with_payload}),
-    [](const auto& info) { return std::string(info.param.name); });
+    [](const auto& each) { return std::string(each.param.name); });
 
 TEST(LoopCheck, WhatIsShippedIsStableAndAHugeIntegralGainIsNot) {
   Experiment experiment = paper_arm();
