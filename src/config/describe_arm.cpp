@@ -155,8 +155,12 @@ static void describe(Keys& key, ControlTerms& it) {
 
 static void describe(Keys& key, TaskSpaceSettings& it) {
   KEY(lambda_1ps, above(0, 1e3), "both poles of the tip's error are at -lambda");
-  KEY(tip_bandwidth_radps, above(0, 1e4), "of the filter on measured tip minus reference");
+  KEY(tip_bandwidth_radps, above(0, 1e4),
+      "of the filter on measured tip minus reference: the only loop of the tip that is closed over "
+      "the arm, so below its slowest mode");
   KEY(posture_rate_1ps, from(0, 100), "of drifting to less bend where the tip does not move");
+  KEY(map_rate_1ps, from(0, 100),
+      "of learning how that difference depends on the place; 0: not learnt");
 }
 
 static void describe(Keys& key, ControllerSettings& it) {
@@ -204,6 +208,17 @@ static void describe_identification(Keys& key, IdentificationSettings& it, Motio
   key("delay_s", it.dead_time_s, from(-1, 100), "from set point to frame, likewise");
 }
 
+static void describe_uncertainty(Keys& key, Experiment& experiment) {
+  ArmUncertainty& it = experiment.uncertainty;
+  KEY(parameters, from(0, 0.5), "of stiffness, damping, mass, length and gain, relative");
+  if (key.reading()) {
+    it.payload_kg = 0.0;
+    for (const SegmentParameters& segment : experiment.arm.segments)
+      it.payload_kg += 0.1 * segment.mass_kg;
+  }
+  KEY(payload_kg, from(0, 100), "at the tip, at most; left out: a tenth of the arm's mass");
+}
+
 void describe(Keys& key, Experiment& it) {
   KEY(name, from(1, 100), "of the experiment, for logs and plots", kRequired);
   KEY(seed, from(0, 9007199254740992.0), "of every random number of the simulated arm");
@@ -212,6 +227,9 @@ void describe(Keys& key, Experiment& it) {
     key("segments", key.segments, from(1, kMaxSegments), "how many", kRequired);
     it.arm.segments.resize(static_cast<std::size_t>(key.segments));
     describe_arm(key, it.arm, kRequired);
+    key.section(
+        {"uncertainty", "how far the arm may differ from what is configured, for the check"},
+        [&] { describe_uncertainty(key, it); });
   });
   key.section({"actuation", "chambers and the limits of their valves", kRequired},
               [&] { describe_actuation(key, it.actuation, kRequired); });

@@ -11,6 +11,8 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
+const std::string kFactor = R"(\+?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?)";
+
 /// 3 instead of 3.0.
 Json number(double value) {
   constexpr double kExact = 9007199254740992.0;
@@ -23,12 +25,16 @@ Json any_of(const std::vector<Json>& schemas) {
   return schemas.size() == 1 ? schemas.front() : Json{{"anyOf", schemas}};
 }
 
-/// What one number may be: itself, or a multiple of pi where it is an angle.
+/// What one number may be: itself, one over another, or a multiple of pi where it is an angle.
 void number_schemas(const Form& form, bool angle, std::vector<Json>& out) {
   Json plain = {{"type", form.whole ? "integer" : "number"}};
   if (form.low > -std::numeric_limits<double>::max())
     plain[form.above_low ? "exclusiveMinimum" : "minimum"] = number(form.low);
   if (form.high < std::numeric_limits<double>::max()) plain["maximum"] = number(form.high);
+  if (!form.whole) {
+    plain["type"] = {"number", "string"};
+    plain["pattern"] = "^[-+]?" + kFactor + "/" + kFactor + "$";
+  }
   out.push_back(plain);
   if (angle) out.push_back({{"$ref", "#/definitions/multiple_of_pi"}});
 }
@@ -143,9 +149,8 @@ std::string json_schema_text(const Entry& root) {
       {"type", "string"},
       {"minLength", 1},
       {"description", "a file, relative to this one, with the keys that this one leaves out"}};
-  const std::string factor = R"(\+?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?)";
   schema["definitions"]["multiple_of_pi"] = {
-      {"type", "string"}, {"pattern", "^[-+]?(" + factor + R"(\*)?pi(/)" + factor + ")?$"}};
+      {"type", "string"}, {"pattern", "^[-+]?(" + kFactor + R"(\*)?pi(/)" + kFactor + ")?$"}};
   schema["if"] = {{"required", {"include"}}};
   schema["else"] = needs_of(root);
   return schema.dump(2) + "\n";

@@ -43,6 +43,7 @@ ControlPipeline::ControlPipeline(const PipelineSettings& settings)
       ramps_(settings.actuation),
       pressure_watch_(settings.safety, allocator_.chambers()),
       curvature_watch_(settings.safety, settings.arm),
+      oscillation_watch_(settings.safety, period_s_, settings.arm.dof()),
       length_watch_(settings.safety, settings.arm),
       previous_bar_(PressureVector::Zero(allocator_.chambers())),
       previous_tau_nm_(SegmentVector::Zero(settings.arm.dof())),
@@ -56,7 +57,7 @@ ControlPipeline::~ControlPipeline() = default;
 
 const TickOutput& ControlPipeline::tick(const TickInput& input) noexcept {
   if (!ticked_) epoch_ns_ = input.now_ns;
-  if (input.command_expired) forget_command();
+  if (input.command_expired || input.paused) forget_command();
   SafetyInput safety;
   validate_and_estimate(input, safety);
 
@@ -65,6 +66,7 @@ const TickOutput& ControlPipeline::tick(const TickInput& input) noexcept {
   predict(input.now_ns, act_ns);
   safety.motion_unknown = !output_.motion.all_valid();
   safety.command_expired = input.command_expired && ticked_;
+  safety.paused = input.paused && ticked_;
   watch(input, safety);
 
   const Mode before = safety_.mode();
@@ -81,6 +83,9 @@ const TickOutput& ControlPipeline::tick(const TickInput& input) noexcept {
   if (mode == Mode::active) {
     reference_.advance(seconds(act_ns));
     control(act_ns);
+    oscillation_watch_.judge(window_.now.u, output_.motion.u_rad);
+  } else {
+    oscillation_watch_.reset();
   }
   limit(mode);
   if (observer_) {
@@ -108,7 +113,8 @@ void ControlPipeline::forget_command() noexcept {
 void ControlPipeline::validate_and_estimate(const TickInput& input, SafetyInput& safety) noexcept {
   // After a stop of this process anything may have happened: what is queued is history, not
   // measurement.
-  const bool gap = ticked_ && input.now_ns - previous_ns_ > safety_.thresholds().vent_after_ns;
+  const bool gap =
+      ticked_ && (input.paused || input.now_ns - previous_ns_ > safety_.thresholds().vent_after_ns);
   if (gap) {
     validator_.reset();
     filter_.reset();
@@ -156,6 +162,7 @@ void ControlPipeline::validate_and_estimate(const TickInput& input, SafetyInput&
   safety.newest_measurement_ns = input.newest_measurement_ns;
   safety.deadman_used = settings_.safety.deadman;
   safety.newest_go_ns = input.newest_go_ns;
+  safety.newest_foreign_ns = input.newest_foreign_ns;
   safety.requests = input.requests;
   output_.soft_limit = safety.soft_limit_exceeded;
   output_.frame_age_s = newest_capture_ns_ == kNever
@@ -166,6 +173,7 @@ void ControlPipeline::validate_and_estimate(const TickInput& input, SafetyInput&
 void ControlPipeline::watch(const TickInput& input, SafetyInput& safety) noexcept {
   if (input.measured_bar != nullptr && input.measured_bar->size() == previous_bar_.size())
     pressure_watch_.measure(*input.measured_bar);
+  safety.oscillation = oscillation_watch_.oscillates();
   safety.pressure_mismatch = settings_.safety.valve_readback && pressure_watch_.out_of_tolerance();
   // An arm that is not pressurised yet can wait for a second look.
   const bool waiting = safety_.mode() == Mode::wait_frames;

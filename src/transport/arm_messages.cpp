@@ -36,6 +36,7 @@ bool decode(std::span<const std::byte> bytes, ArmStatus& out) {
   out.frame_number = message.frame_number;
   out.configuration_hash = static_cast<std::uint64_t>(message.configuration_hash);
   out.seed = static_cast<std::uint64_t>(message.seed);
+  out.nonce = message.nonce;
   out.version = message.version;
   out.mode = static_cast<Mode>(message.mode);
   out.reason = static_cast<Reason>(message.reason);

@@ -38,6 +38,7 @@ struct TickInput {
   const LiveReferenceInput* reference = nullptr;  ///< the newest, if one came
   OperatorRequests requests = {};
   bool command_expired = false;  ///< the last one sent has expired: the valves have vented
+  bool paused = false;           ///< the clock of `now_ns` stood still since the last tick
   int consecutive_overruns = 0;  ///< ticks missed in a row; zero where they are not to be judged
   /// Arrival of the newest pressure measurement, where the valves publish them.
   std::int64_t newest_measurement_ns = kNever;
@@ -45,6 +46,8 @@ struct TickInput {
   const PressureVector* measured_bar = nullptr;
   /// Arrival of the newest "go", where there is a dead-man input.
   std::int64_t newest_go_ns = kNever;
+  /// Arrival of the newest set points on our command channel that another program sent.
+  std::int64_t newest_foreign_ns = kNever;
 };
 
 /// What the tick saw, decided and commands.
@@ -127,6 +130,7 @@ class ControlPipeline {
   PressureRamps ramps_;
   PressureWatch pressure_watch_;
   CurvatureWatch curvature_watch_;
+  OscillationWatch oscillation_watch_;
   LengthWatch length_watch_;
 
   TickOutput output_;

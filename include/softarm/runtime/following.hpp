@@ -1,5 +1,6 @@
 // Checks that the arm follows its commands and is the one configured: measured against commanded
-// pressures, curvature against pressures, measured against configured lengths.
+// pressures, curvature against pressures and against the reference, measured against configured
+// lengths.
 #pragma once
 
 #include <array>
@@ -83,6 +84,52 @@ class CurvatureWatch {
   std::int64_t since_ns_ = 0;
   bool beyond_ = false;
   bool strays_ = false;
+};
+
+/// A loop that is unstable: the error u_ref - u of some coordinate oscillates and does not fade.
+/// Errors and reference pass the same high-pass filter (two poles at `oscillation_lowest_hz`). An
+/// extremum counts where the error has changed sign since the last one, no longer ago than half a
+/// period of the lowest frequency, by at least `oscillation_rad`, by at least `oscillation_part` of
+/// what the reference did meanwhile (what follows the reference, well or badly, is no oscillation),
+/// and by at least 0.7 of the first one in a row (what fades is none either). No allocation, no
+/// clock; bounded: it is found within `oscillation_periods` periods.
+class OscillationWatch {
+ public:
+  /// Of `dof` coordinates that are judged every `period_s`.
+  OscillationWatch(const SafetySettings& settings, double period_s, int dof);
+
+  /// The next tick under control: where the arm should be and where it is, `dof` each, rad.
+  void judge(ConstVectorRef reference_rad, ConstVectorRef u_rad) noexcept;
+
+  /// Some coordinate oscillated for so many periods.
+  bool oscillates() const noexcept { return oscillates_; }
+  /// Starts again, where the arm was not under control.
+  void reset() noexcept;
+
+ private:
+  class HighPass {
+   public:
+    double pass(double value, double share) noexcept;
+
+   private:
+    double slow_ = 0.0, slower_ = 0.0;
+    bool started_ = false;
+  };
+  struct Coordinate {
+    HighPass error, reference;
+    double extremum = 0.0, first_extremum = 0.0;
+    double reference_extremum = 0.0, last_reference_extremum = 0.0;
+    int ticks = 0;         ///< since the error changed sign
+    int half_periods = 0;  ///< in a row
+  };
+
+  void judge(Coordinate& it, double error_rad, double reference_rad) noexcept;
+  void end_half_period(Coordinate& it) noexcept;
+
+  double amplitude_rad_, part_, share_;
+  int longest_ticks_, half_periods_;
+  std::vector<Coordinate> coordinates_;
+  bool oscillates_ = false;
 };
 
 /// The controller's model has segments of constant length. A measured length that is another one for

@@ -21,7 +21,8 @@ struct ArmStatus {
   std::int64_t frame_number = 0;  ///< of the newest frame used
   std::uint64_t configuration_hash = 0;
   std::uint64_t seed = 0;
-  std::string version;  ///< release and commit
+  std::int64_t nonce = 0;  ///< to be echoed by requests
+  std::string version;     ///< release and commit
   Mode mode = Mode::init;
   Reason reason = Reason::starting;  ///< why the mode is not ACTIVE
 

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <utility>
 
+#include "apps/program.hpp"
 #include "softarm/base/clock.hpp"
 #include "softarm/base/time.hpp"
 
@@ -57,8 +58,8 @@ void LiveView::draw(const StatusRecord& record) {
     text += segment_text(status, i);
   if (status.segments() > kShownSegments)
     text += fmt::format("... {} segments more\n", status.segments() - kShownSegments);
-  if (lines_ > 0) fmt::print(stderr, "\033[{}A\033[J", lines_);
-  fmt::print(stderr, "{}", text);
+  if (lines_ > 0) say(fmt::format("\033[{}A\033[J", lines_));
+  say(text);
   lines_ = std::count(text.begin(), text.end(), '\n');
   drawn_ns_ = monotonic_now_ns();
 }
