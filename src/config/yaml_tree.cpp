@@ -37,7 +37,7 @@ std::string quoted_excerpt(const std::string& text) {
 /// Builds the tree from the parser's events, so that errors which yaml-cpp tolerates are found.
 class TreeBuilder : public YAML::EventHandler {
  public:
-  explicit TreeBuilder(FileName file) : file_(std::move(file)) {}
+  TreeBuilder(FileName file, const std::string& text) : file_(std::move(file)), text_(text) {}
 
   YamlNode take_root() { return std::move(root_); }
 
@@ -47,7 +47,9 @@ class TreeBuilder : public YAML::EventHandler {
   /// A copy of what is at the anchor, within a bound: copies of copies double.
   void OnAlias(const YAML::Mark& mark, YAML::anchor_t anchor) override {
     const auto at = anchors_.find(anchor);
-    if (at == anchors_.end()) fail(mark, fmt::format("an anchor that is complete, of at most {} values", kMaxAliased), "another");
+    if (at == anchors_.end())
+      fail(mark, fmt::format("an anchor that is complete, of at most {} values", kMaxAliased),
+           "another");
     YamlNode copy = at->second;
     copy.location = copy.key_location = node(mark, copy.kind).location;
     aliased_ += size_of(copy);
@@ -64,6 +66,7 @@ class TreeBuilder : public YAML::EventHandler {
     YamlNode scalar = node(mark, YamlNode::Kind::scalar);
     scalar.text = value;
     scalar.quoted = tag == "!";
+    if (scalar.quoted) check_quote(mark);
     add(mark, anchored(std::move(scalar), anchor));
   }
   void OnSequenceStart(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t anchor,
@@ -110,6 +113,14 @@ class TreeBuilder : public YAML::EventHandler {
   [[noreturn]] void fail(const YAML::Mark& mark, const std::string& expected,
                          const std::string& got) const {
     throw ConfigError(*file_, mark.line + 1, path(), expected, got);
+  }
+
+  /// The parser takes what follows an opening quote to the next one, however far.
+  void check_quote(const YAML::Mark& mark) const {
+    const auto at = static_cast<std::size_t>(mark.pos);
+    if (at >= text_.size() || (text_[at] != '"' && text_[at] != '\'')) return;
+    if (text_.find(text_[at], at + 1) > text_.find('\n', at))
+      fail(mark, "a closing quote in the same line", "an opening one alone");
   }
 
   static std::size_t size_of(const YamlNode& node) {
@@ -181,6 +192,7 @@ class TreeBuilder : public YAML::EventHandler {
   }
 
   FileName file_;
+  const std::string& text_;
   std::vector<Level> levels_;
   YamlNode root_;
   std::map<YAML::anchor_t, YamlNode> anchors_;
@@ -219,11 +231,11 @@ YamlNode parse(const std::filesystem::path& file) {
     throw ConfigError(*name, line, "", expected, got);
   };
   std::istringstream stream(text);
-  TreeBuilder builder(name);
+  TreeBuilder builder(name, text);
   try {
     YAML::Parser parser(stream);
     parser.HandleNextDocument(builder);
-    TreeBuilder rest(name);
+    TreeBuilder rest(name, text);
     if (parser.HandleNextDocument(rest)) {
       throw ConfigError(*name, 0, "", "one YAML document", "several (a line \"---\")");
     }
