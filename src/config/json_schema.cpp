@@ -51,13 +51,19 @@ void numbers_schemas(const Form& form, bool angle, std::size_t depth, std::vecto
   out.push_back(list);
 }
 
+/// YAML reads false and true as flags, other words as text.
+Json word_json(const std::string& word) {
+  if (word == "false" || word == "true") return word == "true";
+  return word;
+}
+
 /// A default as it would be written; null where its size follows from other keys.
 Json default_of(const Entry& entry) {
   const Form& form = entry.form;
   if (entry.kind == Entry::Kind::text) return entry.text;
   if (entry.numbers.empty()) return {};
   if (form.is_flag()) return entry.numbers.front() != 0.0;
-  if (const auto* word = form.find(entry.numbers)) return word->text;
+  if (const auto* word = form.find(entry.numbers)) return word_json(word->text);
   const std::set<double> different(entry.numbers.begin(), entry.numbers.end());
   if (form.sizes.empty() || (form.one_for_all && different.size() == 1))
     return number(entry.numbers.front());
@@ -77,7 +83,7 @@ Json value_schema(const Entry& entry, bool in_list) {
   }
   if (form.is_flag()) return {{"type", "boolean"}};
   Json words = Json::array();
-  for (const Form::Word& word : form.words) words.push_back(word.text);
+  for (const Form::Word& word : form.words) words.push_back(word_json(word.text));
   if (!form.numeric && in_list && entry.required())
     return {{"const", words.at(static_cast<std::size_t>(entry.numbers.front()))}};
   std::vector<Json> schemas;

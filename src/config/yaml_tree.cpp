@@ -206,8 +206,9 @@ std::string read_text(const std::filesystem::path& file) {
     throw ConfigError(file.string(), 0, "", "a configuration file (config/ holds examples)",
                       "no such file");
   }
-  if (std::filesystem::is_directory(status)) {
-    throw ConfigError(file.string(), 0, "", "a configuration file", "a folder");
+  if (!std::filesystem::is_regular_file(status)) {  // a pipe would be waited for
+    throw ConfigError(file.string(), 0, "", "a configuration file",
+                      std::filesystem::is_directory(status) ? "a folder" : "a pipe or a device");
   }
   std::ifstream stream(file, std::ios::binary);
   std::string text(kMaxFileBytes + 1, '\0');

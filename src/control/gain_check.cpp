@@ -59,6 +59,7 @@ Eigen::VectorXd of_plane(const Eigen::VectorXd& vector, int axis) {
 
 std::array<Judged, 2> judged_planes(const ArmParameters& arm, const Eigen::VectorXd& kp,
                                     const Eigen::VectorXd& kd, bool gravity_fed_back) {
+  expect_constant_length(arm, "gain check");
   const int n = arm.size(), dof = arm.dof();
   if (kp.size() != dof || kd.size() != dof) {
     throw std::invalid_argument(
@@ -112,6 +113,7 @@ std::string explain(const LoopSampling& sampling, double kp, double factor,
 
 Eigen::Matrix3d tip_compliance(const ArmParameters& arm, const Eigen::VectorXd& u,
                                const Eigen::VectorXd& kp_u, bool gravity_fed_back) {
+  expect_constant_length(arm, "tip compliance");
   const int dof = arm.dof();
   if (u.size() != dof || kp_u.size() != dof) {
     throw std::invalid_argument(fmt::format(

@@ -25,9 +25,6 @@ double twice_angle_over(double h, double v) {
   return 2.0 * std::atan2(h, v) / h;
 }
 
-/// c1(theta^2 / 4) = sin(theta / 2) / (theta / 2): chord over length of a PCC segment.
-double c1_of_half(const Eigen::Vector2d& u) { return entire_functions(0.25 * u.squaredNorm())[1]; }
-
 /// The relative transform (19) and what it measures.
 struct RelativePose {
   Eigen::Quaterniond q;
@@ -94,6 +91,20 @@ bool curvature_of(const Eigen::Vector3d& v, Eigen::Vector2d& u) {
   if (!(h > 0.0) && !(v.z() > 0.0)) return false;
   u = twice_angle_over(h, v.z()) * v.head<2>();
   return u.allFinite();
+}
+
+/// The chord over the length of a PCC segment, c1(theta^2 / 4) = sin(x) / x with x = theta / 2, and
+/// the length by the chord. The radial and transverse parts of the positions' noise are independent:
+/// one moves |t|, the other theta, of which l depends by kappa = theta (c2 - c3) / (4 c1) = (1 - x
+/// cot x) / theta.
+void measure_length(double position_variance, SegmentCurvature& out) {
+  const auto c = entire_functions(0.25 * out.u_rad.squaredNorm());
+  out.chord_over_length = c[1];
+  if (!(out.chord_m > 0.0) || !(c[1] > 0.0)) return;
+  const double slope = out.chord_m * out.u_rad.norm() * (c[2] - c[3]) / (4.0 * c[1] * c[1]);
+  out.length_m = out.chord_m / c[1];
+  out.length_variance_m2 = position_variance / (c[1] * c[1]) + slope * slope * out.variance_rad2;
+  out.length_covariance_m_rad = slope * out.variance_rad2;
 }
 
 /// (20) as printed. Where arcsin has no value (its argument above 1 from a quaternion's rounding)
@@ -186,6 +197,7 @@ SegmentCurvature CurvatureEstimator::segment(int index, const BodyPose& upper,
       out.valid = curvature_of(v, out.u_rad);
   }
   if (!out.valid) out.u_rad.setZero();
+  if (out.valid) measure_length(constants.position_variance, out);
   out.twist_rad = 2.0 * std::atan2(relative.twist_sine, bend_norm);
   return out;
 }
@@ -205,7 +217,10 @@ void CurvatureEstimator::estimate(const MocapFrame& frame, CurvatureEstimate& ou
     out.variance_rad2[k] = one.valid ? one.variance_rad2 : 0.0;
     out.twist_rad[k] = one.valid ? one.twist_rad : 0.0;
     out.length_error_m[k] =
-        one.valid ? one.chord_m - segments_[k].length_m * c1_of_half(one.u_rad) : 0.0;
+        one.valid ? one.chord_m - segments_[k].length_m * one.chord_over_length : 0.0;
+    out.length_m[k] = one.length_m;
+    out.length_variance_m2[k] = one.length_variance_m2;
+    out.length_covariance_m_rad[k] = one.length_covariance_m_rad;
   }
 }
 

@@ -19,13 +19,15 @@ constexpr std::int64_t kRateSpan_ns = 1'000'000'000;
 constexpr int kShownSegments = 12;
 
 std::string flag_text(const ArmStatus& status) {
-  const std::pair<bool, const char*> flags[] = {{status.saturated, "saturated"},
-                                                {status.slew_limited, "slew limited"},
-                                                {status.reference_limited, "reference limited"},
-                                                {status.soft_limit, "soft limit"},
-                                                {status.shadow, "shadow"},
-                                                {status.armed, "armed"},
-                                                {status.bounded, "bounded"}};
+  const std::pair<bool, const char*> flags[] = {
+      {status.saturated, "saturated"},
+      {status.slew_limited, "slew limited"},
+      {status.reference_limited, "reference limited"},
+      {status.soft_limit, "soft limit"},
+      {status.shadow, "shadow"},
+      {status.armed, "armed"},
+      {status.bounded, "bounded"},
+      {status.length_warning, "length not as configured"}};
   std::string text;
   for (const auto& [set, name] : flags)
     if (set) text += fmt::format("   {}", name);

@@ -44,6 +44,7 @@ const std::vector<Trigger> kTriggers = {
     {Reason::disarmed, 2, [](SafetyInput& in) { in.requests.disarm = true; }},
     {Reason::pressure_mismatch, 3, [](SafetyInput& in) { in.pressure_mismatch = true; }},
     {Reason::curvature_mismatch, 4, [](SafetyInput& in) { in.curvature_mismatch = true; }},
+    {Reason::length_mismatch, 13, [](SafetyInput& in) { in.length_mismatch = true; }},
     {Reason::deadman_released, 5,
      [](SafetyInput& in) { in.newest_go_ns = in.now_ns - kDeadman - kStep; }},
     {Reason::deadman_released, 5, [](SafetyInput& in) { in.newest_go_ns = kNever; }},

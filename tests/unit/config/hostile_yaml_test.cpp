@@ -1,4 +1,6 @@
 // Whatever a file holds, load_experiment returns or throws ConfigError, within bounds.
+#include <sys/stat.h>
+
 #include <random>
 #include <string>
 #include <vector>
@@ -65,6 +67,9 @@ TEST(HostileYaml, WhatIsNoFileIsRefused) {
   const TestFolder folder;
   EXPECT_NE(refusal(folder.path() / "missing.yaml").find("no such file"), std::string::npos);
   EXPECT_NE(refusal(folder.path()).find("a folder"), std::string::npos);
+  const auto pipe = folder.path() / "pipe.yaml";
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  EXPECT_NE(refusal(pipe).find("a pipe"), std::string::npos) << "nobody writes to it";
   EXPECT_NE(refusal("").find("no such file"), std::string::npos);
   EXPECT_NE(refusal("/dev/zero"), "");
   EXPECT_NE(refusal(folder.write("empty.yaml", "")).find("sections"), std::string::npos);

@@ -111,8 +111,8 @@ TEST_F(MotionLog, AStampThatIsNoTimeCostsItsMessageAlone) {
 /// The clock of the logger is set while it logs: the motion is that of the good log.
 TEST_F(MotionLog, AStepOfTheLoggersClockChangesNothing) {
   const LoggedMotion good = read(bytes_);
-  for (const std::int64_t step_us :
-       {-2'000'000LL, 2'000'000LL, -600'000'000LL, 31'536'000'000'000LL, -1'700'000'000'000'000LL}) {
+  for (const std::int64_t step_us : {-2'000'000LL, 2'000'000LL, -600'000'000LL,
+                                     31'536'000'000'000LL, -1'700'000'000'000'000LL}) {
     const LoggedMotion set = read(log_with(step_us, 0));
     ASSERT_EQ(set.record.time_s.size(), good.record.time_s.size()) << step_us;
     EXPECT_LT((set.record.time_s - good.record.time_s).cwiseAbs().maxCoeff(), 1e-3) << step_us;
