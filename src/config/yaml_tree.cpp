@@ -268,19 +268,6 @@ void merge(YamlNode& base, YamlNode&& over) {
   }
 }
 
-/// A file that `from` includes: relative to its name or, where that is a link, to the file itself.
-std::filesystem::path included_by(const std::filesystem::path& from, const std::string& name,
-                                  std::string& looked_for) {
-  std::error_code code;
-  std::filesystem::path first = from.parent_path() / name;
-  const std::filesystem::path real = std::filesystem::canonical(from, code).parent_path() / name;
-  looked_for = "no file " + first.string();
-  if (std::filesystem::is_regular_file(first, code)) return first;
-  if (code || !std::filesystem::equivalent(real.parent_path(), first.parent_path(), code) || code)
-    looked_for += " and none " + real.string();
-  return std::filesystem::is_regular_file(real, code) ? real : std::filesystem::path();
-}
-
 /// `chain`: the files that include one another, this one last; `files`: all read.
 YamlNode read_with_includes(const std::filesystem::path& file, Files& chain, Files& files) {
   files.push_back(file);
@@ -297,7 +284,7 @@ YamlNode read_with_includes(const std::filesystem::path& file, Files& chain, Fil
   };
   if (include.kind != YamlNode::Kind::scalar) fail("the name of a file", include.describe());
   std::string looked_for;
-  const auto included = included_by(file, include.text, looked_for);
+  const auto included = included_file(file, include.text, looked_for);
   if (included.empty())
     fail("an existing file, relative to this one",
          fmt::format("{} ({})", quoted_excerpt(include.text), looked_for));
@@ -332,6 +319,18 @@ std::string YamlNode::describe() const {
       break;
   }
   return "nothing";
+}
+
+std::filesystem::path included_file(const std::filesystem::path& from, const std::string& name,
+                                    std::string& looked_for) {
+  std::error_code code;
+  std::filesystem::path first = from.parent_path() / name;
+  const std::filesystem::path real = std::filesystem::canonical(from, code).parent_path() / name;
+  looked_for = "no file " + first.string();
+  if (std::filesystem::is_regular_file(first, code)) return first;
+  if (code || !std::filesystem::equivalent(real.parent_path(), first.parent_path(), code) || code)
+    looked_for += " and none " + real.string();
+  return std::filesystem::is_regular_file(real, code) ? real : std::filesystem::path();
 }
 
 YamlNode read_yaml_file(const std::filesystem::path& file, Files& files) {
