@@ -14,7 +14,7 @@ namespace softarm {
 namespace {
 
 constexpr double kStill_m = 1e-3;
-constexpr double kRest_s = 1.0;
+constexpr double kRest_s = 1.0, kLeastRest_s = 0.3;
 constexpr std::size_t kLooked = 5000;  ///< rows that are looked at, spread over the table
 
 std::string lower(std::string text) {
@@ -211,7 +211,8 @@ class Proposal {
                                                        unit_m_ < 1.0 ? "millimetres" : "metres")};
   }
 
-  /// The first second in which no body moves; else the first row with all.
+  /// The first second in which no body moves, or the longest part of one; else the first row with
+  /// all bodies.
   void find_rest() {
     std::vector<std::size_t> window;
     for (std::size_t row = 0; row < table_.rows(); ++row) {
@@ -224,12 +225,13 @@ class Proposal {
         if (unit_m_ * (position(row, i) - position(window.front(), i)).norm() > kStill_m)
           window.clear();
       window.push_back(row);
-      if (time_s(row) - time_s(window.front()) < kRest_s) continue;
+      const double still_s = time_s(row) - time_s(window.front());
+      if (still_s < kLeastRest_s || still_s <= rest_to_s_ - rest_from_s_) continue;
       take_rest(window.front());
       rest_from_s_ = time_s(window.front());
       rest_to_s_ = time_s(row);
       still_ = true;
-      return;
+      if (still_s >= kRest_s) return;
     }
     if (rest_.empty())
       throw std::runtime_error(
@@ -362,12 +364,12 @@ class Proposal {
 
   std::string rest_text() const {
     if (!still_)
-      return "# rest: {from_s: 0, to_s: 1}  # NOT FOUND: no second in which the arm is still "
+      return "# rest: {from_s: 0, to_s: 1}  # NOT FOUND: no 0.3 s in which the arm is still "
              "within 1 mm\n";
     const bool standing = to_tip().maxCoeff() > 0.9;
     return fmt::format(
-        "rest: {{from_s: {:.12g}, to_s: {:.12g}{}}}  # the first second without motion\n",
-        rest_from_s_, rest_to_s_, standing ? ", base_rotation: standing" : "");
+        "rest: {{from_s: {:.12g}, to_s: {:.12g}{}}}  # without motion, within 1 mm\n", rest_from_s_,
+        rest_to_s_, standing ? ", base_rotation: standing" : "");
   }
 
   std::string pressures() const {
@@ -391,7 +393,8 @@ class Proposal {
     if (commanded.empty() && measured.empty())
       return "# pressures: {commanded: ..., measured: ...}  # no column is named so\n";
     double unit = most > 2e4 ? 1e-5 : most > 2e3 ? 1e-3 : most > 20.0 ? 1e-2 : 1.0;
-    std::string why = fmt::format("the largest is {:.4g}", most);
+    std::string why = fmt::format("the largest is {:.4g}{}", most,
+                                  most > 5.0 && most <= 20.0 ? ": bar, or psi (0.0689476)?" : "");
     if (!unit_name.empty()) {
       unit = unit_name == "kpa"    ? 1e-2
              : unit_name == "mbar" ? 1e-3
