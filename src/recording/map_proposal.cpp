@@ -216,7 +216,7 @@ class Proposal {
   void find_rest() {
     std::vector<std::size_t> window;
     for (std::size_t row = 0; row < table_.rows(); ++row) {
-      bool seen = true;
+      bool seen = std::isfinite(time_s(row));
       for (std::size_t i = 0; i < bodies_.size(); ++i)
         seen = seen && position(row, i).allFinite() && rotation(row, i, false).coeffs().allFinite();
       if (!seen) continue;
