@@ -18,6 +18,7 @@ namespace softarm {
 
 /// Where the logger's clock did not simply run on.
 struct LogBreak {
+  /// What happened.
   enum class Kind {
     clock_set,  ///< the clock was set, or a stamp damaged: the messages' own times bridge it
     gap,        ///< nothing came for longer than LogTimeline::kLongestGap_ns
