@@ -18,9 +18,9 @@ class SideOfThePlant : public ::testing::Test {
     settings.slew_bar_per_s = 10.0;
     return settings;
   }
-  CommandVerdict command(std::int64_t sequence, double bar) {
-    const std::array<double, 2> pressures{bar, bar};
-    return side.receive({.sequence = sequence, .validity_ns = 100 * kMs, .pressure_bar = pressures},
+  CommandVerdict command(std::int64_t number, double wanted) {
+    const std::array<double, 2> pressures{wanted, wanted};
+    return side.receive({.sequence = number, .validity_ns = 100 * kMs, .pressure_bar = pressures},
                         now);
   }
   double bar() const { return side.set_points().maxCoeff(); }
