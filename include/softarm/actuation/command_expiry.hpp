@@ -87,6 +87,8 @@ class CommandExpiry {
   const Eigen::VectorXd& set_points_bar() const noexcept { return set_points_bar_; }
 
  private:
+  friend struct ProofOfGuard;  ///< tests/proof: all of its state
+
   CommandVerdict compare(const PressureCommand& command, std::int64_t arrival_ns) const noexcept;
 
   std::int64_t longest_ns_;

@@ -46,9 +46,9 @@ class DaemonLinkOverUdp : public ::testing::Test {
     }
   }
 
-  std::unique_ptr<DaemonLink> make_link() const {
+  std::unique_ptr<DaemonLink> make_link(bool shadow = false) const {
     return std::make_unique<DaemonLink>(settings, transport,
-                                        Provenance{.version = "test", .build = "build"}, false);
+                                        Provenance{.version = "test", .build = "build"}, shadow);
   }
 
   void ask(std::int64_t sequence, std::int8_t request, std::int64_t nonce) {
@@ -124,6 +124,7 @@ TEST_F(DaemonLinkOverUdp, TenThousandTicksAllocateNothing) {
   LoopTiming timing;
   const LcmSettings& lcm = transport.lcm;
   pressure_measurement_t measurement = test::example<pressure_measurement_t>(3, 4);
+  measurement.sequence = 1;  // some command is in force
   curvature_reference_t reference = test::example<curvature_reference_t>(3, 4);
   operator_command_t operator_command{
       .sequence = 0, .nonce = 0, .request = operator_command_t::ARM};
@@ -214,8 +215,7 @@ TEST_F(DaemonLinkOverUdp, WhatWasDecidedBeforeTheValvesVentedIsNotSentAfterIt) {
 // Commands may have been lost on the way although this side sent them in time.
 TEST_F(DaemonLinkOverUdp, ValvesThatReportThatTheyHaveVentedAreACommandThatExpired) {
   settings.safety.valve_readback = false;  // heard all the same
-  link = std::make_unique<DaemonLink>(settings, transport,
-                                      Provenance{.version = "test", .build = "build"}, false);
+  link = std::make_unique<DaemonLink>(settings, transport, Provenance{"", 0, 0, "build"}, false);
   TickOutput output;
   output.pressure_bar = PressureVector::Constant(12, 0.5);
   pressure_measurement_t report = test::example<pressure_measurement_t>(3, 4);
@@ -333,6 +333,13 @@ TEST_F(DaemonLinkOverUdp, AnArmMustEchoAStatusOfTheLastSecondSinceTheLastStop) {
   link = make_link();
   ask(++number, kArm, before + 1'000'000);
   EXPECT_TRUE(nothing_comes(arms));
+}
+
+// Nobody echoes its status.
+TEST_F(DaemonLinkOverUdp, AShadowIsArmedWithTheDaemonThatCommands) {
+  link = make_link(true);
+  ask(1, kArm, 0);
+  EXPECT_TRUE(collect_until(arms));
 }
 
 TEST_F(DaemonLinkOverUdp, AnArmFromBeforeAVentIsRefused) {
