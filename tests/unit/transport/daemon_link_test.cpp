@@ -220,6 +220,7 @@ TEST_F(DaemonLinkOverUdp, ValvesThatReportThatTheyHaveVentedAreACommandThatExpir
   output.pressure_bar = PressureVector::Constant(12, 0.5);
   pressure_measurement_t report = test::example<pressure_measurement_t>(3, 4);
   const auto expired = [](const TickInput& input) { return input.command_expired; };
+  EXPECT_TRUE(link->collect(now_ns).command_expired) << "none was sent";
   link->publish_command(now_ns, output);
   sender->publish(transport.lcm.measurement_channel, report);
   EXPECT_TRUE(nothing_comes(expired)) << "in force";
