@@ -40,6 +40,8 @@ class LostCommands : public FaultTest {
     validity_s_ = granted_s;
     configure(*this);
     const auto plant = start_plant(*this);
+    // It has read the configuration, which is then the daemon's.
+    ASSERT_TRUE(wait_for([&] { return plant_states_ > 0; })) << plant->printed();
     lcm_.clear();
     validity_s_ = asked_s;
     configure(*this, ", arming: explicit");

@@ -18,8 +18,8 @@ class SideOfThePlant : public ::testing::Test {
     settings.slew_bar_per_s = 10.0;
     return settings;
   }
-  CommandVerdict command(std::int64_t number, double wanted) {
-    const std::array<double, 2> pressures{wanted, wanted};
+  CommandVerdict command(std::int64_t number, double pressure_bar) {
+    const std::array<double, 2> pressures{pressure_bar, pressure_bar};
     return side.receive({.sequence = number, .validity_ns = 100 * kMs, .pressure_bar = pressures},
                         now);
   }

@@ -215,12 +215,12 @@ TEST_F(DaemonLinkOverUdp, WhatWasDecidedBeforeTheValvesVentedIsNotSentAfterIt) {
 // Commands may have been lost on the way although this side sent them in time.
 TEST_F(DaemonLinkOverUdp, ValvesThatReportThatTheyHaveVentedAreACommandThatExpired) {
   settings.safety.valve_readback = false;  // heard all the same
-  link = std::make_unique<DaemonLink>(settings, transport,
-                                      Provenance{.version = "test", .build = "build"}, false);
+  link = std::make_unique<DaemonLink>(settings, transport, Provenance{"", 0, 0, "build"}, false);
   TickOutput output;
   output.pressure_bar = PressureVector::Constant(12, 0.5);
   pressure_measurement_t report = test::example<pressure_measurement_t>(3, 4);
   const auto expired = [](const TickInput& input) { return input.command_expired; };
+  EXPECT_TRUE(link->collect(now_ns).command_expired) << "none was sent";
   link->publish_command(now_ns, output);
   sender->publish(transport.lcm.measurement_channel, report);
   EXPECT_TRUE(nothing_comes(expired)) << "in force";
