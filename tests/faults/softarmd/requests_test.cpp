@@ -217,7 +217,7 @@ TEST_P(RequestFaults, AnArmIsNotObeyedAfterALaterDisarmOrStop) {
 
 TEST_P(RequestFaults, ARecordThatIsPlayedNeitherArmsNorHoldsTheDeadMan) {
   lcm_ = ", deadman_channel: GO";
-  configure(*this, ", arming: explicit");
+  configure(*this, ", arming: explicit, deadman_timeout_s: 1");
   const auto plant = start_plant(*this);
   const auto daemon = start("softarmd");
   std::vector<std::pair<std::string, std::vector<std::byte>>> record;
@@ -229,7 +229,7 @@ TEST_P(RequestFaults, ARecordThatIsPlayedNeitherArmsNorHoldsTheDeadMan) {
   });
   auto deadman = start("softarm", {"deadman"});
   ASSERT_TRUE(becomes(*this, Mode::wait_frames, Reason::waiting_for_arm)) << daemon->printed();
-  EXPECT_EQ(ask("arm"), 0);
+  ask_until_done(*this, OperatorRequest::arm);
   ASSERT_TRUE(wait_for([&] { return under_pressure(); })) << daemon->printed();
   EXPECT_EQ(ask("estop"), 0);
   EXPECT_EQ(ask("disarm"), 0);
