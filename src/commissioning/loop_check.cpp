@@ -132,8 +132,10 @@ double largest_stable(double none, double most, double exactness,
   return none;
 }
 
-void find_margins(const Experiment& experiment, LoopMargins& margins) {
-  if (!(margins.at.growth_1ps < 0.0)) return;
+LoopMargins margins_of(const Experiment& experiment, const LoopFinding& found) {
+  LoopMargins margins;
+  margins.at = found;
+  if (!(found.growth_1ps < 0.0)) return margins;
   const auto stable = [&](double gain, double delay_s) {
     Experiment changed = experiment;
     scale_gain(changed, gain);
@@ -141,9 +143,23 @@ void find_margins(const Experiment& experiment, LoopMargins& margins) {
     return disturbance_growth_1ps(changed) < 0.0;
   };
   margins.gain =
-      largest_stable(1.0, kLargestGainMargin, 0.02, [&](double gain) { return stable(gain, 0.0); });
-  margins.delay_s = largest_stable(0.0, kLargestDelayMargin_s, 0.5e-3,
+      largest_stable(1.0, kLargestGainMargin, 0.05, [&](double gain) { return stable(gain, 0.0); });
+  margins.delay_s = largest_stable(0.0, kLargestDelayMargin_s, 1e-3,
                                    [&](double delay_s) { return stable(1.0, delay_s); });
+  return margins;
+}
+
+/// The smallest margins, each for itself, and where the gain's was found.
+void keep_smallest(const LoopMargins& found, LoopMargins& kept) {
+  if (kept.at.arm.empty()) {
+    kept = found;
+    return;
+  }
+  if (found.gain < kept.gain) {
+    kept.gain = found.gain;
+    kept.at = found.at;
+  }
+  kept.delay_s = std::min(kept.delay_s, found.delay_s);
 }
 
 }  // namespace
@@ -202,24 +218,25 @@ double disturbance_growth_1ps(const Experiment& asked) {
 LoopCheck check_loop(const Experiment& asked) {
   const Experiment declared = on_declared_arm(asked);
   LoopCheck check;
-  Experiment worst_configured, worst;
   for (const Place& place : places(declared)) {
+    LoopFinding slowest;
+    Experiment configured, worst;
     for (const Corner& corner : kCorners) {
       Experiment experiment = at(corner, declared);
       experiment.reference = place.reference;
-      const LoopFinding finding{corner.name, place.name, disturbance_growth_1ps(experiment)};
-      check.findings.push_back(finding);
-      const auto keep_worst = [&](LoopMargins& margins, Experiment& kept) {
-        if (!margins.at.arm.empty() && finding.growth_1ps <= margins.at.growth_1ps) return;
-        margins.at = finding;
-        kept = experiment;
-      };
-      if (&corner == kCorners) keep_worst(check.configured, worst_configured);
-      keep_worst(check.worst, worst);
+      check.findings.push_back({corner.name, place.name, disturbance_growth_1ps(experiment)});
+      const LoopFinding& found = check.findings.back();
+      if (&corner == kCorners) {
+        keep_smallest(margins_of(experiment, found), check.configured);
+        slowest = found;
+        worst = experiment;
+      } else if (found.growth_1ps > slowest.growth_1ps) {
+        slowest = found;
+        worst = std::move(experiment);
+      }
     }
+    keep_smallest(margins_of(worst, slowest), check.worst);
   }
-  find_margins(worst_configured, check.configured);
-  find_margins(worst, check.worst);
   return check;
 }
 

@@ -15,9 +15,10 @@ struct LoopFinding {
   double growth_1ps;  ///< of the disturbance: negative where the loop is stable; infinite: lost
 };
 
-/// How far the loop is from unstable where its disturbance fades slowest.
+/// How far a loop is from unstable, wherever it was judged: straight and in every phase, each on the
+/// arm on which a disturbance fades slowest.
 struct LoopMargins {
-  LoopFinding at;
+  LoopFinding at;        ///< where the gain margin is smallest
   double gain = 0.0;     ///< largest factor on the moments of all chambers; 0: unstable as it is
   double delay_s = 0.0;  ///< largest additional dead time
 };
