@@ -48,7 +48,7 @@ void describe(Keys& key, ValveDriverSettings& it) {
   KEY(backoff_s, from(0.01, 60),
       "before connecting again, at least 1.5 failsafe_timeout_s; doubles with every failure");
   KEY(longest_backoff_s, from(0.01, 600), "what it grows to");
-  KEY(failsafe_timeout_s, above(0, 10), "silence of ours after which the terminal itself vents");
+  KEY(failsafe_timeout_s, above(0, 1), "silence of ours after which the terminal itself vents");
   KEY(vented_bar, above(0, 1), "measured pressures up to this count as vented");
   KEY(stuck_bar, above(0, 100), "a pressure further from its set point than this ...");
   KEY(stuck_after_s, above(0, 100), "... for so long belongs to a stuck valve");

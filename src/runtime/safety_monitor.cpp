@@ -221,11 +221,13 @@ CauseRule SafetyMonitor::worst_cause(const SafetyInput& input) const noexcept {
 
 void SafetyMonitor::take_operator_requests(const SafetyInput& input, Mode demanded) noexcept {
   // Arming applies to what the operator sees now. It is never kept until a cause is gone, and an
-  // `arm` queued in the kernel while the daemon was stopped, which looks new, does not count. One
-  // that does not lead to ACTIVE lapses: nobody expects the arm to move long after a key press.
-  const bool hindered = demanded >= Mode::vent || (demanded == Mode::hold && !under_control());
+  // `arm` queued in the kernel while the daemon was stopped, which looks new, does not count. With
+  // explicit arming one that does not lead to ACTIVE lapses: nobody expects the arm to move long
+  // after a key press.
+  const bool lapses = settings_.arming == Arming::explicit_ && !under_control();
+  const bool hindered = demanded >= Mode::vent || (demanded == Mode::hold && lapses);
   if (input.requests.arm && !hindered && mode_ != Mode::fault && input.now_ns >= deaf_until_ns_) {
-    if (!armed_ && !under_control()) arm_pending_since_ns_ = input.now_ns;
+    if (!armed_ && lapses) arm_pending_since_ns_ = input.now_ns;
     armed_ = true;
   } else if (arm_pending_since_ns_ != kNever &&
              (hindered || input.now_ns - arm_pending_since_ns_ > thresholds_.arm_lapses_ns)) {

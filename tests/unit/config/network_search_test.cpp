@@ -3,7 +3,6 @@
 
 #include <gtest/gtest.h>
 #include <sys/stat.h>
-#include <unistd.h>
 
 #include <filesystem>
 #include <string>
@@ -43,6 +42,14 @@ TEST_F(NetworkSearch, FollowsIncludesAndWhatComesLaterCounts) {
   EXPECT_EQ(lcm.status_channel, "HERE");
 }
 
+TEST_F(NetworkSearch, FollowsIncludesBesideTheFileBehindALink) {
+  std::filesystem::create_directories(folder_ / "real");
+  write("real/base.yaml", "daemon: {lcm: {url: \"udpm://239.1.1.5:5\"}}\n");
+  write("real/arm.yaml", "include: base.yaml\n");
+  std::filesystem::create_symlink("real/arm.yaml", folder_ / "link.yaml");
+  EXPECT_EQ(find_network(folder_ / "link.yaml").url, "udpm://239.1.1.5:5");
+}
+
 TEST_F(NetworkSearch, EndsWhereFilesIncludeOneAnotherOrAreNotThere) {
   const LcmSettings lcm =
       find_network(write("round.yaml", "include: round.yaml\nurl: udpm://239.1.1.3:3\n"));
@@ -53,7 +60,7 @@ TEST_F(NetworkSearch, EndsWhereFilesIncludeOneAnotherOrAreNotThere) {
   for (int k = 0; k < 12; ++k) often += "include: often.yaml\n";
   EXPECT_EQ(find_network(write("often.yaml", often + "url: udpm://239.1.1.4:4\n")).url,
             "udpm://239.1.1.4:4");
-  const fs::path pipe = folder_ / "pipe.yaml";
+  const std::filesystem::path pipe = folder_ / "pipe.yaml";
   ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
   EXPECT_EQ(find_network(pipe).url, LcmSettings().url);
 }

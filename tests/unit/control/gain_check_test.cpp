@@ -15,6 +15,7 @@
 namespace softarm {
 namespace {
 
+using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 /// Fast enough to be as good as continuous.

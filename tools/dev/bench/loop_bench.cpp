@@ -74,6 +74,7 @@ class Scene {
         folder_(std::filesystem::temp_directory_path() /
                 fmt::format("softarm_bench_loop_{}", getpid())) {
     std::filesystem::create_directories(folder_);
+    setenv("XDG_STATE_HOME", folder_.c_str(), 1);  // of the daemon
     std::ofstream(folder_ / "loop.yaml") << fmt::format(
         "include: {}\nname: bench_loop\nreference: [{{kind: set_point, theta_rad: {}}}]\n"
         "daemon:\n  rate_hz: {}\n  capture_time: latency\n"
