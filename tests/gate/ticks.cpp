@@ -18,6 +18,7 @@ namespace {
 
 using test::PipelineBench;
 
+constexpr int kTicks = 3;        // of a scene
 constexpr int kMostFrames = 64;  // that the daemon takes in one tick
 
 /// Everything that costs time is on: mass along the arc and across it, a path of the tip, valve lag,
@@ -112,7 +113,7 @@ void play(const std::function<void(const std::string& name, const std::function<
               fmt::format("not ACTIVE: {}", name(bench->pipeline.output().reason)));
         bench->run(10);
         bench->publishing = false;
-        for (int k = 0; k < 6; ++k) {
+        for (int k = 0; k < kTicks; ++k) {
           scene.before(*bench);
           tick(fmt::format("tick.{}.{}.{}", observer == ObserverKind::model ? "model" : "kinematic",
                            scene.name, segments),
@@ -127,15 +128,16 @@ void play(const std::function<void(const std::string& name, const std::function<
 
 void count_ticks() {
   play([](const std::string& name, const std::function<void()>& tick) {
+    const std::string label = name + " 1";
     CALLGRIND_ZERO_STATS;
     tick();
-    CALLGRIND_DUMP_STATS_AT((name + " 1").c_str());
+    CALLGRIND_DUMP_STATS_AT(label.c_str());
   });
 }
 
 void time_ticks() {
   std::vector<std::pair<std::string, std::vector<double>>> times;
-  for (int k = 0; k < 50; ++k) {
+  for (int k = 0; k < 5; ++k) {
     play([&](const std::string& name, const std::function<void()>& tick) {
       const std::int64_t start_ns = monotonic_now_ns();
       tick();

@@ -179,9 +179,10 @@ class Judge {
     // Whether the arm may move at all. An `arm` is for what the operator sees, and lapses.
     const bool waiting = before <= Mode::wait_frames;
     const bool controlled = before == Mode::active || before == Mode::hold;
-    const bool hindered = demanded >= Mode::vent || (demanded == Mode::hold && !controlled);
+    const bool lapses = setup_.arming == Arming::explicit_ && !controlled;
+    const bool hindered = demanded >= Mode::vent || (demanded == Mode::hold && lapses);
     if (in.requests.arm && !hindered && before != Mode::fault && !deaf) {
-      if (!seen.may_move && !controlled) seen.pending_ns = in.now_ns;
+      if (!seen.may_move && lapses) seen.pending_ns = in.now_ns;
       seen.may_move = true;
     } else if (seen.pending_ns != kNever &&
                (hindered || in.now_ns - seen.pending_ns > lapses_ns_)) {
@@ -446,6 +447,38 @@ TEST(MonitorProof, EveryCauseHasItsTrigger) {
     bool found = rule.reason == Reason::valves_silent;
     for (const Trigger& trigger : kTriggers) found |= trigger.reason == rule.reason;
     EXPECT_TRUE(found) << name(rule.reason);
+  }
+}
+
+TEST(MonitorProof, AnArmLapsesAfterTwoSecondsAndTwiceTheGoodFrames) {
+  SafetySettings settings;
+  settings.good_frames = 50;
+  settings.frame_period_s = 0.125;
+  EXPECT_EQ(resolve_thresholds(settings, 0.002).arm_lapses_ns, 14'500 * kMs);
+  settings.frame_period_s = 0.002;
+  EXPECT_EQ(resolve_thresholds(settings, 0.125).arm_lapses_ns, 14'500 * kMs);
+}
+
+/// In steps that are shorter than those of the exploration.
+TEST(MonitorProof, NeitherFramesNorArmCountForHalfASecondAfterAStop) {
+  for (const int cause : {0, 1, 2}) {
+    SafetyMonitor monitor(settings_of({Arming::explicit_, false}), kPeriod_s);
+    SafetyInput in = healthy(kEpoch_ns);
+    in.fully_vented = true;
+    monitor.step(in);
+    in = healthy(kEpoch_ns + (cause == 0 ? kVent + 1 : 1));
+    in.paused = cause == 1;
+    in.command_expired = cause == 2;
+    monitor.step(in);
+    const std::int64_t stopped_ns = in.now_ns;
+    for (std::int64_t later_ns = 100 * kMs; later_ns <= kDeaf + 100 * kMs; later_ns += 100 * kMs) {
+      in = healthy(stopped_ns + later_ns);
+      in.fully_vented = in.requests.arm = true;
+      in.good_frames = 1;
+      monitor.step(in);
+      EXPECT_EQ(monitor.armed(), later_ns >= kDeaf) << cause << " after " << later_ns;
+      EXPECT_EQ(monitor.mode() == Mode::active, later_ns >= kDeaf + 100 * kMs) << cause;
+    }
   }
 }
 
