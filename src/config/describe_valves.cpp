@@ -47,9 +47,9 @@ void describe(Keys& key, ValveDriverSettings& it) {
   KEY(tolerated_failures, from(0, 100), "cycles in a row without a good answer; one more vents");
   KEY(backoff_s, from(0.01, 60), "before connecting again; doubles with every failure");
   KEY(longest_backoff_s, from(0.01, 600), "what it grows to");
-  KEY(failsafe_timeout_s, above(0, 10), "silence of ours after which the terminal itself vents");
+  KEY(failsafe_timeout_s, above(0, 1), "silence of ours after which the terminal itself vents");
   KEY(stuck_bar, above(0, 100), "a pressure further from its set point than this ...");
-  KEY(stuck_after_s, above(0, 100), "... for so long belongs to a stuck valve");
+  KEY(stuck_after_s, above(0, 5), "... for so long belongs to a stuck valve");
   KEY(stuck_vents, "a stuck valve vents the arm; false: it is only reported");
 }
 

@@ -33,11 +33,17 @@ struct CurvatureEstimate {
   /// Rotation about the segment's own axis, from q_z, in [-pi, pi]; zero for a PCC segment. Blind
   /// at theta = pi.
   std::array<double, kMaxSegments> twist_rad{};
+  /// Rotation about the chord that a PCC segment with this chord does not have, in [-pi, pi]: the
+  /// same, but not blind at any theta with a chord. It is twist_rad where there is no chord.
+  std::array<double, kMaxSegments> torsion_rad{};
   /// |t| minus the PCC chord L c1(theta^2 / 4); zero for a PCC segment whose length is right.
   std::array<double, kMaxSegments> length_error_m{};
   /// False: one of the segment's bodies was not seen, or its pose fits no bend; the segment's
   /// numbers are then zero.
   std::array<bool, kMaxSegments> valid{};
+
+  /// Makes segment `index` (0-based) one that was not observed.
+  void leave_out(int index) noexcept;
 };
 
 /// u of one segment from the pose of its upper and lower end.
@@ -45,6 +51,7 @@ struct SegmentCurvature {
   Eigen::Vector2d u_rad = Eigen::Vector2d::Zero();
   double variance_rad2 = 0.0;
   double twist_rad = 0.0;
+  double torsion_rad = 0.0;
   double chord_m = 0.0;  ///< |t|
   bool valid = false;
 };

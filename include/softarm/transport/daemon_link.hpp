@@ -63,6 +63,10 @@ class DaemonLink {
 
   /// Messages that could not be decoded.
   std::int64_t malformed() const noexcept { return malformed_; }
+  /// Measurements older by their sender's clock than the one before: two senders, or a restart.
+  std::int64_t backward_measurements() const noexcept { return backward_measurements_; }
+  /// References with a number that is not above the newest.
+  std::int64_t backward_references() const noexcept { return backward_references_; }
   /// Publications that failed, and commands that were too late to send.
   std::int64_t unsent() const noexcept { return unsent_; }
 
@@ -99,6 +103,8 @@ class DaemonLink {
   std::int64_t commands_ = 0;
   std::int64_t sent_us_ = kNever;  ///< time in the newest command
   std::int64_t malformed_ = 0;
+  std::int64_t measurement_time_us_ = kNever;
+  std::int64_t backward_measurements_ = 0, backward_references_ = 0;
   std::int64_t unsent_ = 0;
 
   softarm_messages::curvature_reference_t reference_message_;

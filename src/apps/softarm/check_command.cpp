@@ -33,6 +33,7 @@ int check(const CheckOptions& options) {
   if (options.live) return check_live(experiment, options.live_check);
   fmt::print("# {}, configuration {}\n{}", options.file, hash_text(experiment.hash),
              resolved_text(experiment));
+  for (const std::string& line : reaction_times(experiment)) fmt::print("# {}\n", line);
   return kExitOk;
 }
 

@@ -13,6 +13,7 @@
 #include "softarm/base/version.hpp"
 #include "softarm/config/load.hpp"
 #include "softarm/transport/daemon_loop.hpp"
+#include "softarm/transport/input_report.hpp"
 #include "softarm/transport/lcm_node.hpp"
 #include "softarm/transport/settings.hpp"
 
@@ -40,7 +41,7 @@ void print_summary(const DaemonLoop& loop) {
 }
 
 /// Prints every change of mode or reason, and what was refused; reports to the service manager.
-void run(DaemonLoop& loop, LineLog& log, ServiceNotifier& service) {
+void run(DaemonLoop& loop, LineLog& log, ServiceNotifier& service, const LcmSettings& lcm) {
   constexpr std::int64_t kRefused_ns = 1'000'000'000;  // malformed messages may come at any rate
   Mode mode = Mode::init;
   Reason reason = Reason::none;
@@ -52,16 +53,32 @@ void run(DaemonLoop& loop, LineLog& log, ServiceNotifier& service) {
     refused = total;
     refused_reported_ns = now_ns;
   };
+  InputReport report_inputs;
+  const auto report_streams = [&](std::int64_t now_ns) {
+    const InputReport::Counts counts{
+        .mode = mode,
+        .frames = loop.pipeline().counters(),
+        .late_frames = loop.pipeline().late_frames(),
+        .frame_channel = lcm.mocap_channel,
+        .measurements = {lcm.measurement_channel, loop.link().backward_measurements()},
+        .references = {lcm.reference_channel, loop.link().backward_references()}};
+    if (const auto text = report_inputs.refusals(now_ns, counts); !text.empty())
+      log.add("{}", text);
+    if (const auto text = report_inputs.second_sender(now_ns, counts); !text.empty())
+      log.add("{}", text);
+  };
   loop.run([] { return stop_requested != 0; },
            [&](const DaemonLoop::Report& report) {
              const TickOutput& output = loop.pipeline().output();
              if (output.mode != mode || output.reason != reason) {
                mode = output.mode;
                reason = output.reason;
-               log.add("{:.3f} s: {} ({})", to_seconds(report.since_start_ns), name(mode),
-                       name(reason));
+               const bool verdict = reason == Reason::frames_refused;
+               log.add("{:.3f} s: {} ({}{}{})", to_seconds(report.since_start_ns), name(mode),
+                       name(reason), verdict ? ": " : "", verdict ? name(output.refusal) : "");
              }
              report_refused(report.woken_ns);
+             report_streams(report.woken_ns);
              service.report(report.woken_ns, {.state = name(mode),
                                               .reason = name(reason),
                                               .on_time = report.on_time,
@@ -105,7 +122,7 @@ int serve(const std::string& path, bool shadow) {
                    .build = build_text()},
                   shadow);
   apply_realtime_settings(realtime);
-  run(loop, log, service);
+  run(loop, log, service, lcm);
   log.finish();
   print_summary(loop);
   return kExitOk;
