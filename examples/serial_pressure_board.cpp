@@ -21,6 +21,7 @@ class SerialBoard : public softarm::ValveBackend {
   bool is_open() const noexcept override { return line_.is_open(); }
   const char* error() const noexcept override { return line_.error(); }
   std::string address() const override { return line_.device(); }
+  bool answers_writes() const noexcept override { return true; }
 
   Secured secure() noexcept override {
     LinkResult result = line_.send(vent_after_);

@@ -1,9 +1,8 @@
-"""The arm in a browser, live or from a recorded run. usage: python -m softarm.view CONFIG [--log LOG] ...
+"""The arm in a browser, live or from a recorded run: started by `softarm view`.
 
 Needs the package viser; everything is served from this machine.
 """
 
-import argparse
 import csv
 import pathlib
 import subprocess
@@ -223,28 +222,13 @@ def play(view, pictures):
                     index += 1
 
 
-class Parser(argparse.ArgumentParser):
-    def error(self, message):
-        self.print_usage(sys.stderr)
-        print(f"softarm view: {message}", file=sys.stderr)
-        sys.exit(64)
-
-
-def main(arguments=None):
-    parser = Parser(prog="softarm view", description="The arm in a browser, live or from a recorded run.")
-    parser.add_argument("config", metavar="CONFIG", help="the experiment")
-    parser.add_argument("--log", help="play this run: its folder, log.csv, or a log of lcm-logger or softarm watch")
-    parser.add_argument("--host", default="127.0.0.1", help="address to serve on (default: this machine only)")
-    parser.add_argument("--port", type=int, default=8080, help="port to serve on (default 8080)")
-    parser.add_argument("--control", action="store_true", help="buttons to arm, disarm and stop the arm")
-    options = parser.parse_args(arguments)
-    if options.log and options.control:
-        parser.error("--control is for a running arm, not for a log")
+def main(config, log, host, port, control):
+    """Serve the page until interrupted; `softarm view --help` has the options. Returns the exit code."""
     try:
-        experiment = softarm.load_experiment(options.config)
-        pictures = read_log(options.log, experiment, options.config) if options.log else None
-        client = None if options.log else softarm.ArmClient(experiment)
-        view = View(experiment, options.host, options.port)
+        experiment = softarm.load_experiment(config)
+        pictures = read_log(log, experiment, config) if log else None
+        client = None if log else softarm.ArmClient(experiment)
+        view = View(experiment, host, port)
     except ImportError as error:
         print(f"softarm view: {error}; tools/python_environment installs viser", file=sys.stderr)
         return 69
@@ -253,12 +237,12 @@ def main(arguments=None):
         return 78
     except (OSError, ValueError, subprocess.CalledProcessError, softarm.TransportError) as error:
         print(f"softarm view: {error}", file=sys.stderr)
-        return 74
-    print(f"softarm view: http://{options.host}:{view.server.get_port()} (Ctrl-C ends it)", flush=True)
+        return 1
+    print(f"softarm view: http://{host}:{view.server.get_port()} (Ctrl-C ends it)", flush=True)
     try:
         if pictures:
             play(view, pictures)
-        pending = view.add_control(client) if options.control else tuple
+        pending = view.add_control(client) if control else tuple
         for picture in live_pictures(client):
             for request in pending():
                 view.say(f"{request}: {client.request(request)}")
@@ -271,4 +255,4 @@ def main(arguments=None):
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(main(*sys.argv[1:4], int(sys.argv[4]), sys.argv[5] == "control"))

@@ -18,14 +18,27 @@ Eigen::Matrix2Xd input_map(ActuationKind kind, const std::vector<Chamber>& segme
   return map;
 }
 
-Eigen::MatrixXd input_map(const ActuationSettings& settings) {
+Eigen::RowVectorXd axial_input_map(ActuationKind kind, const std::vector<Chamber>& segment) {
+  Eigen::RowVectorXd map = Eigen::RowVectorXd::Zero(static_cast<Eigen::Index>(segment.size()));
+  if (kind == ActuationKind::torque) return map;
+  for (std::size_t j = 0; j < segment.size(); ++j) {
+    map[static_cast<Eigen::Index>(j)] = segment[j].gain_nm_per_bar / segment[j].offset_m;
+  }
+  return map;
+}
+
+Eigen::MatrixXd input_map(const ActuationSettings& settings, bool extensible) {
+  const Eigen::Index width = extensible ? 3 : 2;
   Eigen::MatrixXd map = Eigen::MatrixXd::Zero(
-      2 * static_cast<Eigen::Index>(settings.segments.size()), chamber_count(settings));
+      width * static_cast<Eigen::Index>(settings.segments.size()), chamber_count(settings));
   Eigen::Index row = 0, column = 0;
   for (const std::vector<Chamber>& segment : settings.segments) {
     const auto count = static_cast<Eigen::Index>(segment.size());
     map.block(row, column, 2, count) = input_map(settings.kind, segment);
-    row += 2;
+    if (extensible) {
+      map.block(row + 2, column, 1, count) = axial_input_map(settings.kind, segment);
+    }
+    row += width;
     column += count;
   }
   return map;

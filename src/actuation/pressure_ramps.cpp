@@ -12,6 +12,13 @@ double step_towards(double previous, double wanted, double max_step) noexcept {
   return previous + std::copysign(max_step, step);
 }
 
+double rise_towards(double previous, double wanted, double max_rise) noexcept {
+  if (!std::isfinite(wanted)) return 0.0;
+  const double from = previous * wanted > 0.0 ? std::abs(previous) : 0.0;
+  const double most = from + std::max(max_rise, 0.0);
+  return std::abs(wanted) <= most ? wanted : std::copysign(most, wanted);
+}
+
 PressureRamps::PressureRamps(const ActuationSettings& settings)
     : min_bar_(settings.min_pressure_bar),
       max_bar_(settings.max_pressure_bar),

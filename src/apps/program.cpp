@@ -1,19 +1,41 @@
 #include "apps/program.hpp"
 
 #include <fmt/format.h>
+#include <poll.h>
+#include <unistd.h>
 
+#include <algorithm>
+#include <atomic>
+#include <cerrno>
 #include <cmath>
+#include <csignal>
 #include <cstdio>
 #include <exception>
 #include <filesystem>
 #include <iostream>
+#include <sstream>
+#include <string_view>
 
 #include "softarm/base/instance_lock.hpp"
+#include "softarm/base/output_file.hpp"
 #include "softarm/base/version.hpp"
 #include "softarm/config/config_error.hpp"
 
 namespace softarm {
 namespace {
+
+/// Without what a terminal would obey: the text may quote a file or a message of somebody else.
+std::string printable(std::string text) {
+  for (std::size_t k = 0; k < text.size(); ++k) {
+    const auto letter = static_cast<unsigned char>(text[k]);
+    const auto next = static_cast<unsigned char>(k + 1 < text.size() ? text[k + 1] : ' ');
+    const bool c0 = (letter < 0x20 && letter != '\n' && letter != '\t') || letter == 0x7f;
+    const bool c1 = letter == 0xc2 && next >= 0x80 && next < 0xa0;  // in UTF-8
+    if (c0 || c1) text[k] = '?';
+    if (c1) text[k + 1] = '?';
+  }
+  return text;
+}
 
 int parse_and_run(int argc, char** argv, CLI::App& app, const std::function<int()>& body) {
   try {
@@ -31,12 +53,17 @@ int parse_and_run(int argc, char** argv, CLI::App& app, const std::function<int(
     app.exit(CLI::ExtrasError(app.get_name(), unknown));
     return kExitUsage;
   } catch (const ConfigError& error) {
-    print_error(app.get_name(), error.what());
+    std::istringstream lines(error.what());  // one for each error
+    for (std::string line; std::getline(lines, line);) print_error(app.get_name(), line);
     return kExitConfiguration;
+  } catch (const OutputIsInput& error) {
+    print_error(app.get_name(), error.what());
+    return kExitUsage;
   } catch (const OtherInstance& error) {
     print_error(app.get_name(), error.what());
     return kExitOtherInstance;
   } catch (const std::exception& error) {
+    if (std::ferror(stdout) != 0) return kExitOk;  // which run_program reports
     print_error(app.get_name(), error.what());
     return kExitFailure;
   }
@@ -51,7 +78,24 @@ std::string shared_file(const std::string& name, const std::string& source) {
   return std::filesystem::exists(installed, error) ? installed.string() : source;
 }
 
-void say(const std::string& text) noexcept { std::fputs(text.c_str(), stderr); }
+void say(const std::string& text) noexcept {
+  constexpr int kPatience_ms = 200;
+  constexpr std::size_t kAtOnce = 512;  // a pipe that takes any takes as much
+  static std::atomic<bool> stuck{false};
+  try {
+    const std::string printed = printable(text);
+    std::string_view left = printed;
+    while (!left.empty()) {
+      pollfd where{.fd = STDERR_FILENO, .events = POLLOUT, .revents = 0};
+      stuck = poll(&where, 1, stuck ? 0 : kPatience_ms) <= 0;
+      if (stuck) return;
+      const ssize_t written = write(STDERR_FILENO, left.data(), std::min(left.size(), kAtOnce));
+      if (written < 0 && errno != EINTR) return;
+      if (written > 0) left.remove_prefix(static_cast<std::size_t>(written));
+    }
+  } catch (...) {  // out of memory: lost
+  }
+}
 
 CLI::Validator number_between(double low, double high) {
   const auto check = [low, high](std::string& text) -> std::string {
@@ -82,10 +126,12 @@ void print_error(const std::string& program, const std::string& message) {
 int run_program(int argc, char** argv, CLI::App& app, const std::function<int()>& body) {
   app.set_version_flag(
       "--version", fmt::format("{} {} (commit {})", app.get_name(), version_text(), commit_text()));
+  std::signal(SIGXFSZ, SIG_IGN);  // a file at its largest size is an error of write()
   const int code = parse_and_run(argc, argv, app, body);
   std::cout.flush();
-  if ((std::fflush(stdout) != 0 || !std::cout) && code == kExitOk) {
-    print_error(app.get_name(), "standard output could not be written");
+  const bool flushed = std::fflush(stdout) == 0;
+  if ((!flushed || std::ferror(stdout) != 0 || !std::cout) && code == kExitOk) {
+    print_error(app.get_name(), "standard output could not be written: is the disk full?");
     return kExitFailure;
   }
   return code;

@@ -23,8 +23,9 @@ enum ExitCode : int {
 /// program, otherwise `source` in the source tree.
 std::string shared_file(const std::string& name, const std::string& source);
 
-/// Prints on stderr. Text that cannot be written (a full disk, a closed pipe) is lost: a program
-/// that moves an arm must not end for that.
+/// Prints on stderr, without characters that a terminal would obey. Text that cannot be written (a
+/// full disk, a closed pipe, a pipe that nobody reads) is lost: a program that moves an arm must
+/// neither end nor wait for that.
 void say(const std::string& text) noexcept;
 
 /// Accepts a finite time above zero, in s.

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include "apps/program.hpp"
 #include "softarm/base/clock.hpp"
 
 namespace softarm {
@@ -16,7 +17,7 @@ constexpr long long kLinePeriod_ns = 5'000'000'000;
 Progress::Progress(bool always) : terminal_(isatty(STDERR_FILENO) != 0), always_(always) {}
 
 Progress::~Progress() {
-  if (terminal_) fmt::print(stderr, "\r\033[K");
+  if (terminal_) say("\r\033[K");
 }
 
 bool Progress::due() const {
@@ -27,7 +28,7 @@ bool Progress::due() const {
 void Progress::update(const std::string& text) {
   if (!due()) return;
   last_ns_ = monotonic_now_ns();
-  fmt::print(stderr, "{}{}{}", terminal_ ? "\r\033[K" : "", text, terminal_ ? "" : "\n");
+  say(fmt::format("{}{}{}", terminal_ ? "\r\033[K" : "", text, terminal_ ? "" : "\n"));
 }
 
 }  // namespace softarm

@@ -30,6 +30,7 @@ ValveGuardSettings guard_settings(const Experiment& experiment) {
   return {.driver = experiment.valves,
           .chambers = static_cast<int>(experiment.valves.order.size()),
           .max_pressure_bar = experiment.actuation.max_pressure_bar,
+          .slew_bar_per_s = experiment.actuation.slew_bar_per_s,
           .rise_bar_per_s = experiment.actuation.vent_bar_per_s,
           .longest_validity_s = experiment.safety.command_validity_s,
           .wait_for_zero = experiment.safety.arming == Arming::explicit_};
@@ -57,16 +58,25 @@ bool drive(const std::string& program, const Experiment& experiment, ValveDriver
     say(fmt::format("{}: warning: {}\n", program, refused));
   ValvesLoop loop(experiment.transport.lcm, experiment.valves.rate_hz, driver);
   std::array<char, 200> text;
-  const bool vented =
-      loop.run([] { return stop_requested != 0; },
-               [&](const ValvesLoop::Report& report) {
-                 if (report.changed)
-                   log.add("{:.3f} s: {}", to_seconds(report.since_start_ns), driver.text(text));
-                 service.report(report.now_ns, {.state = name(driver.guard().state()),
-                                                .reason = name(driver.guard().reason()),
-                                                .on_time = report.on_time,
-                                                .stopping = driver.stopping()});
-               });
+  std::int64_t shortened_ns = 0;  // reported validity of commands that are not held so long
+  const bool vented = loop.run(
+      [] { return stop_requested != 0; },
+      [&](const ValvesLoop::Report& report) {
+        if (report.changed)
+          log.add("{:.3f} s: {}", to_seconds(report.since_start_ns), driver.text(text));
+        const CommandExpiry& commands = driver.guard().commands();
+        if (commands.asked_ns() > commands.longest_ns() && commands.asked_ns() != shortened_ns) {
+          shortened_ns = commands.asked_ns();
+          log.add(
+              "commands ask to be held for {:.3g} s; they expire after "
+              "daemon.lcm.command_validity_s, {:.3g} s",
+              to_seconds(shortened_ns), to_seconds(commands.longest_ns()));
+        }
+        service.report(report.now_ns, {.state = name(driver.guard().state()),
+                                       .reason = name(driver.guard().reason()),
+                                       .on_time = report.on_time,
+                                       .stopping = driver.stopping()});
+      });
   log.finish();
   print_summary(program, loop, driver.guard().counters());
   return vented;
@@ -96,11 +106,14 @@ int serve(const std::string& program, const std::string& path) {
                   valves.order.size(), valves.backend, backend->address(), valves.rate_hz));
   if (const std::string warning = backend->warning(); !warning.empty())
     say(fmt::format("{}: warning: {}\n", program, warning));
+  if (const std::string warning = network_warning(lcm.url); !warning.empty())
+    say(fmt::format("{}: warning: {}\n", program, warning));
   ValveDriver driver(guard_settings(experiment), std::move(backend));
   if (drive(program, experiment, driver)) return kExitOk;
-  print_error(program, fmt::format("the valves did not confirm set points of zero; they vent by "
-                                   "their own time-out of {} s",
-                                   valves.failsafe_timeout_s));
+  print_error(program,
+              fmt::format("measured pressures did not fall to {} bar; the valves vent by their own "
+                          "time-out of {} s",
+                          valves.vented_bar, valves.failsafe_timeout_s));
   return kExitFailure;
 }
 

@@ -10,6 +10,8 @@ namespace {
 constexpr std::int64_t kNsPerSecond = 1'000'000'000;
 constexpr std::int64_t kTogether_ns = 5000;
 constexpr int kAttempts = 4;
+/// Both clocks count the same oscillator; no suspend is as short as this.
+constexpr std::int64_t kShortestPause_ns = 1'000'000;
 
 timespec to_timespec(std::int64_t time_ns) noexcept {
   return {.tv_sec = time_ns / kNsPerSecond, .tv_nsec = time_ns % kNsPerSecond};
@@ -38,6 +40,25 @@ ClockPair read_clocks() noexcept {
     before_ns = after_ns;
   }
   return best;
+}
+
+PauseWatch::Difference PauseWatch::read() noexcept {
+  const std::int64_t before_ns = monotonic_now_ns(), boot_ns = read_ns(CLOCK_BOOTTIME);
+  return {boot_ns - monotonic_now_ns(), boot_ns - before_ns};
+}
+
+PauseWatch::PauseWatch() noexcept : known_(read()) {}
+
+bool PauseWatch::paused() noexcept {
+  const Difference now = read();
+  const bool changed = now.least_ns > known_.most_ns + kShortestPause_ns ||
+                       now.most_ns < known_.least_ns - kShortestPause_ns;
+  if (changed) {
+    known_ = now;
+  } else {  // what both readings allow
+    known_ = {std::max(known_.least_ns, now.least_ns), std::min(known_.most_ns, now.most_ns)};
+  }
+  return changed;
 }
 
 void sleep_until_ns(std::int64_t deadline_ns) noexcept {

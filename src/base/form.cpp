@@ -19,6 +19,8 @@ constexpr std::array kUnits = std::to_array<std::pair<std::string_view, std::str
     {"_nms_per_rad", "N m s/rad"},
     {"_nm_per_bar", "N m/bar"},
     {"_nm_per_s", "N m/s"},
+    {"_ns_per_m", "N s/m"},
+    {"_n_per_m", "N/m"},
     {"_bar_per_s", "bar/s"},
     {"_per_bar", "1/bar"},
     {"_per_sqrt_s", "1/s^0.5"},

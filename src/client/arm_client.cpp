@@ -7,6 +7,7 @@
 
 #include "client/arm_sight.hpp"
 #include "client/command_ramp.hpp"
+#include "softarm/base/clock.hpp"
 #include "softarm/base/instance_lock.hpp"
 #include "softarm/config/load.hpp"
 #include "softarm/transport/message_decoding.hpp"
@@ -55,6 +56,9 @@ struct ArmClient::State {
   void take_measurement(const ArmMessage& message) {
     softarm_messages::pressure_measurement_t decoded;
     if (!decode(message.bytes, decoded)) return;
+    // Valves that have vented since the last report hold no command of ours, whatever kept them.
+    if (ramp && valves_expired && decoded.expired != *valves_expired) ramp->interrupt();
+    valves_expired = decoded.expired;
     measured = {message.arrival_ns,
                 Eigen::Map<const Eigen::VectorXf>(decoded.pressure_bar.data(),
                                                   std::ssize(decoded.pressure_bar))
@@ -92,6 +96,8 @@ struct ArmClient::State {
   std::function<void(const ChamberCommand&)> on_command;
   std::optional<InstanceLock> lock;
   std::optional<CommandRamp> ramp;
+  std::optional<std::int32_t> valves_expired;  ///< count in their last report
+  PauseWatch pause;
 };
 
 ArmClient::ArmClient(Experiment experiment, Clock clock)
@@ -196,6 +202,7 @@ void ArmClient::vent() {
 
 void ArmClient::send_command() {
   CommandRamp& ramp = *state_->ramp;
+  if (state_->pause.paused()) ramp.interrupt();
   if (const std::int64_t now = now_ns(); ramp.due(now))
     publish(experiment().transport.lcm.command_channel, ramp.next(now));
 }

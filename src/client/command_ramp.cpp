@@ -41,11 +41,15 @@ double CommandRamp::step_s(std::int64_t now_ns) {
   return to_seconds(passed_ns);
 }
 
+void CommandRamp::interrupt() {
+  bar_.setZero();
+  held_up_ = true;
+}
+
 const softarm_messages::pressure_command_t& CommandRamp::next(std::int64_t now_ns) {
   const bool first = sent_ns_ == kNever;
   if (!first && has_expired(message_.time_us, message_.validity_us, now_ns / 1000)) {
-    bar_.setZero();
-    held_up_ = true;
+    interrupt();
   }
   if (first) bar_.setZero();
   next_ns_ = now_ns + period_ns_;
@@ -53,14 +57,8 @@ const softarm_messages::pressure_command_t& CommandRamp::next(std::int64_t now_n
   ++message_.sequence;
   message_.time_us = now_ns / 1000;
   message_.pressure_bar.assign(bar_.begin(), bar_.end());
-  sent_us_[static_cast<std::size_t>(message_.sequence) % sent_us_.size()] = message_.time_us;
+  sent_.add(message_.sequence, message_.time_us);
   return message_;
-}
-
-bool CommandRamp::is_ours(const ChamberCommand& command) const {
-  const auto place = static_cast<std::size_t>(command.sequence) % sent_us_.size();
-  return command.sequence > 0 && command.sequence <= message_.sequence &&
-         sent_us_[place] == command.time_us;
 }
 
 }  // namespace softarm

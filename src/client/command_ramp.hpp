@@ -1,13 +1,13 @@
 // Which set points are sent next, and when: limits, ramp and expiry, with time as an argument.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <softarm_messages/pressure_command_t.hpp>
 
 #include "softarm/actuation/pressure_ramps.hpp"
 #include "softarm/base/time.hpp"
 #include "softarm/transport/arm_messages.hpp"
+#include "softarm/transport/sent_commands.hpp"
 
 namespace softarm {
 
@@ -24,8 +24,9 @@ class CommandRamp {
   void vent(std::int64_t now_ns);
 
   bool due(std::int64_t now_ns) const { return now_ns >= next_ns_; }
-  /// The command to send at `now_ns`. If the one before it has expired, the valves have vented and
-  /// set points begin at zero again.
+  /// The valves have vented: set points begin at zero again.
+  void interrupt();
+  /// The command to send at `now_ns`. If the one before it has expired, the valves have vented.
   const softarm_messages::pressure_command_t& next(std::int64_t now_ns);
 
   const PressureVector& set_points_bar() const { return bar_; }
@@ -34,7 +35,9 @@ class CommandRamp {
   /// Whether some command was sent after the one before it had expired.
   bool held_up() const { return held_up_; }
   /// Whether this is one of the latest commands that `next` returned.
-  bool is_ours(const ChamberCommand& command) const;
+  bool is_ours(const ChamberCommand& command) const {
+    return sent_.contains(command.sequence, command.time_us);
+  }
 
  private:
   double step_s(std::int64_t now_ns);
@@ -45,7 +48,7 @@ class CommandRamp {
   std::int64_t period_ns_, updated_ns_ = 0, next_ns_ = 0, sent_ns_ = kNever;
   bool held_up_ = false;
   softarm_messages::pressure_command_t message_;
-  std::array<std::int64_t, 1024> sent_us_{};  ///< ring of the latest, by sequence number
+  SentCommands sent_;
 };
 
 }  // namespace softarm

@@ -116,32 +116,41 @@ bool OperatorClient::daemon_armed() const {
 
 std::string OperatorClient::daemon_text() const { return status_ ? status_->text() : "not heard"; }
 
-bool OperatorClient::try_to_send(OperatorRequest what) {
-  return node_.publish(lcm_.operator_channel,
-                       softarm_messages::operator_command_t{
-                           .sequence = next_sequence(), .request = static_cast<std::int8_t>(what)});
+bool OperatorClient::try_to_send(OperatorRequest what, std::int64_t number, std::int64_t nonce) {
+  return node_.publish(
+      lcm_.operator_channel,
+      softarm_messages::operator_command_t{
+          .sequence = number, .nonce = nonce, .request = static_cast<std::int8_t>(what)});
 }
 
 void OperatorClient::send(OperatorRequest what) {
-  if (!try_to_send(what)) throw_unsent();
+  if (!try_to_send(what, next_sequence(), newest_nonce())) throw_unsent();
 }
 
 RequestOutcome OperatorClient::request(OperatorRequest what, double patience_s) {
+  const std::int64_t number = next_sequence();
   update(now_ns());  // what came before is not an answer
   const std::int64_t before = statuses_;
   std::int64_t next_ns = 0;
-  bool sent = false;
+  std::optional<std::int64_t> nonce;
+  bool tried = false, sent = false;
   const auto heard = [&] { return sent && statuses_ > before; };
   const auto understood = [&] {
     if (heard() && shows(*status_, what)) return true;
+    if (!nonce && statuses_ > before) {
+      nonce = status_->nonce;
+      next_ns = 0;
+    }
+    if (!nonce && what == OperatorRequest::arm) return false;
     if (const std::int64_t now_ns = monotonic_now_ns(); now_ns >= next_ns) {
-      sent |= try_to_send(what);
+      tried = true;
+      sent |= try_to_send(what, number, nonce.value_or(0));
       next_ns = now_ns + kAskAgain_ns;
     }
     return false;
   };
   if (wait_for(understood, patience_s)) return RequestOutcome::done;
-  if (!sent) throw_unsent();
+  if (tried && !sent) throw_unsent();
   return heard() ? RequestOutcome::refused : RequestOutcome::unheard;
 }
 
@@ -150,6 +159,7 @@ void OperatorClient::send_go(bool go) {
     throw std::logic_error("there is no dead-man input: lcm.deadman_channel is empty");
   publish(lcm_.deadman_channel,
           softarm_messages::deadman_t{.sequence = next_sequence(),
+                                      .nonce = newest_nonce(),
                                       .go = static_cast<std::int8_t>(go ? 1 : 0)});
 }
 

@@ -41,6 +41,7 @@ class Checks {
     check_radius("arm", experiment_.arm, false);
     check_radius("plant.arm", experiment_.plant.arm,
                  experiment_.plant.kind.get_if<LinkSettings>() != nullptr);
+    check_stretch();
     check_actuation("actuation", experiment_.actuation);
     check_actuation("plant.actuation", experiment_.plant.actuation);
     check_same_chambers();
@@ -113,6 +114,21 @@ class Checks {
     require(!asked || (arm.mass == MassModel::distributed && !links), key + ".radius_m",
             "0 where mass is in points or the arm is made of links: they have no cross-section",
             "a radius");
+  }
+
+  /// The simulated arm may stretch; estimator and controller do not know it.
+  void check_stretch() const {
+    require(!experiment_.arm.extensible, "arm.extensible",
+            "false: the controller has no segments that stretch yet, only the simulated arm has "
+            "(plant.arm.extensible)",
+            "segments that stretch");
+    const PlantSettings& plant = experiment_.plant;
+    if (!plant.arm.extensible) return;
+    require(plant.arm.actuation == ActuationModel::chamber, "plant.arm.extensible",
+            "false with actuation_model: couple, which has no axial force",
+            "segments that stretch");
+    check_module("plant.arm.extensible", "a kind of plant whose segments can stretch, such as pcc",
+                 [&] { plant.kind.make(plant); });
   }
 
   void check_actuation(const std::string& key, const ActuationSettings& it) const {

@@ -14,6 +14,16 @@ std::string message(const std::string& file, int line, const std::string& key,
   return fmt::format("{}: {}expected {}, got {}", place, what, expected, got);
 }
 
+std::string message(const std::vector<ConfigError>& errors) {
+  std::string text;
+  for (std::size_t i = 0; i < errors.size() && i < ConfigErrors::kMost; ++i)
+    text += fmt::format("{}{}", i == 0 ? "" : "\n", errors[i].what());
+  if (errors.size() > ConfigErrors::kMost)
+    text +=
+        fmt::format("\n{}: and {} more", errors.front().file, errors.size() - ConfigErrors::kMost);
+  return text;
+}
+
 }  // namespace
 
 ConfigError::ConfigError(std::string file_name, int line_number, std::string key_path,
@@ -24,5 +34,16 @@ ConfigError::ConfigError(std::string file_name, int line_number, std::string key
       key(std::move(key_path)),
       expected(std::move(expected_text)),
       got(std::move(got_text)) {}
+
+ConfigError::ConfigError(const ConfigError& first, const std::string& text)
+    : std::runtime_error(text),
+      file(first.file),
+      line(first.line),
+      key(first.key),
+      expected(first.expected),
+      got(first.got) {}
+
+ConfigErrors::ConfigErrors(const std::vector<ConfigError>& errors)
+    : ConfigError(errors.front(), message(errors)) {}
 
 }  // namespace softarm

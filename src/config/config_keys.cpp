@@ -10,36 +10,13 @@
 #include <set>
 #include <utility>
 
+#include "config/hints.hpp"
 #include "config/yaml_tree.hpp"
 
 namespace softarm {
 namespace {
 
 constexpr std::size_t kLongestList = 256;
-
-std::size_t edit_distance(std::string_view a, std::string_view b) {
-  std::vector<std::size_t> row(b.size() + 1);
-  std::iota(row.begin(), row.end(), std::size_t{0});
-  for (const char c : a) {
-    std::size_t diagonal = row[0]++;
-    for (std::size_t j = 0; j < b.size(); ++j) {
-      const std::size_t kept = diagonal + (c == b[j] ? 0 : 1);
-      diagonal = row[j + 1];
-      row[j + 1] = std::min({kept, row[j] + 1, row[j + 1] + 1});
-    }
-  }
-  return row.back();
-}
-
-/// Whether one may be the other misspelt, or with another unit.
-bool similar(std::string_view a, std::string_view b) {
-  constexpr std::size_t kLongestKey = 64;
-  if (a.size() > kLongestKey) return false;
-  const std::size_t shorter = std::min(a.size(), b.size());
-  const bool prefix = shorter >= 4 && a.substr(0, shorter) == b.substr(0, shorter);
-  return prefix ||
-         edit_distance(a, b) <= std::max<std::size_t>(1, std::max(a.size(), b.size()) / 4);
-}
 
 /// All of the text as a number.
 template <typename T>
@@ -48,10 +25,6 @@ std::optional<double> parsed(std::string_view text) {
   const auto [end, code] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (code != std::errc() || end != text.data() + text.size() || text.empty()) return {};
   return static_cast<double>(value);
-}
-
-std::optional<double> plain_number(std::string_view text) {
-  return parsed<double>(text.substr(text.starts_with('+') ? 1 : 0));
 }
 
 /// An angle as people write it: "pi", "-pi/2", "3*pi/4", "0.2*pi/180".
@@ -69,15 +42,31 @@ std::optional<double> multiple_of_pi(std::string_view text) {
   return sign * *factor * std::numbers::pi / *divisor;
 }
 
-[[noreturn]] void fail(const YamlNode& node, const std::string& path, const std::string& expected) {
-  throw ConfigError(*node.location.file, node.location.line, path, expected, node.describe());
+/// @param fix  what would be right, where that is known
+[[noreturn]] void fail(const YamlNode& node, const std::string& path, const std::string& expected,
+                       const std::string& fix = "") {
+  throw ConfigError(*node.location.file, node.location.line, path, expected,
+                    node.describe() + (fix.empty() ? "" : " (" + fix + ")"));
+}
+
+/// "a.b[1].c" without indices.
+std::string without_indices(std::string_view path) {
+  std::string out;
+  bool index = false;
+  for (const char c : path) {
+    if (c == '[') index = true;
+    if (!index) out += c;
+    if (c == ']') index = false;
+  }
+  return out;
 }
 
 /// Appends the numbers of a node to `out`.
 struct NumberReader {
   const Form& form;
   const std::string& expected;
-  bool angle;
+  std::string_view unit;
+  bool any_size;  ///< what the size follows from is wrong itself
   std::vector<double>& out;
 
   void read(const YamlNode& node, const std::string& path, std::size_t depth) const {
@@ -91,17 +80,22 @@ struct NumberReader {
     const std::size_t size = node.items.size();
     if (node.kind != YamlNode::Kind::list || innermost || size == 0) fail(node, path, expected);
     const int wanted = form.sizes[depth];
-    if (wanted == Form::kAny ? size > kLongestList : size != static_cast<std::size_t>(wanted))
-      fail(node, path, expected);
+    const bool counted = wanted != Form::kAny && !(any_size && depth == 0);
+    if (counted ? size != static_cast<std::size_t>(wanted) : size > kLongestList)
+      fail(node, path, expected,
+           counted && size == 2 * static_cast<std::size_t>(wanted)
+               ? "numbers with decimal commas? write decimal points"
+               : "");
     for (std::size_t i = 0; i < size; ++i)
       read(node.items[i], fmt::format("{}[{}]", path, i), depth + 1);
   }
 
   double number(const YamlNode& node, const std::string& path) const {
-    auto value = form.whole ? parsed<std::int64_t>(node.text) : plain_number(node.text);
-    if (!value && angle) value = multiple_of_pi(node.text);
+    auto value = plain_number(node.text);
+    if (form.whole && !parsed<std::int64_t>(node.text)) value.reset();
+    if (!value && unit == "rad") value = multiple_of_pi(node.text);
     if (node.quoted || !value || !std::isfinite(*value) || !form.contains(*value))
-      fail(node, path, expected);
+      fail(node, path, expected, likely_fix(node.text, node.quoted, form, unit));
     return *value == 0.0 ? 0.0 : *value;  // no negative zero: what is printed reads back the same
   }
 };
@@ -111,31 +105,13 @@ struct NumberReader {
 struct ConfigKeys::Frame {
   const YamlNode* node;
   std::string path;
-  std::set<std::string_view> known = {};    ///< keys declared
-  std::optional<ConfigError> missing = {};  ///< the first
-  std::string_view missing_key = {};
+  bool quiet = false;                     ///< the section is missing or none: its keys are too
+  bool failed = false;                    ///< a value of it is wrong
+  bool kind_known = true;                 ///< the word that decides which keys there are
+  std::set<std::string_view> known = {};  ///< keys declared
 
   std::string path_of(std::string_view key) const {
     return path.empty() ? std::string(key) : fmt::format("{}.{}", path, key);
-  }
-
-  /// Refuses keys that were not declared: all of them, or those that may be the missing key
-  /// misspelt.
-  void refuse_unknown(bool lookalikes_only) const {
-    for (std::size_t i = 0; i < node->keys.size(); ++i) {
-      const std::string& key = node->keys[i];
-      if (known.contains(key) || (lookalikes_only && !similar(key, missing_key))) continue;
-      const auto guess = std::find_if(known.begin(), known.end(), [&](const auto& other) {
-        return node->find(other) == nullptr && similar(key, other);
-      });
-      const std::string all =
-          known.empty() ? "no keys" : fmt::format("one of {}", fmt::join(known, ", "));
-      const Location& at = node->items[i].key_location;
-      throw ConfigError(
-          *at.file, at.line, path_of(key), lookalikes_only ? std::string(missing_key) : all,
-          guess == known.end() ? "an unknown key"
-                               : fmt::format("an unknown key (did you mean {}?)", *guess));
-    }
   }
 };
 
@@ -150,14 +126,80 @@ std::string Entry::documentation() const {
 ConfigKeys::ConfigKeys(Purpose purpose) : purpose_(purpose) {}
 
 ConfigKeys::ConfigKeys(const std::filesystem::path& file)
-    : purpose_(Purpose::read), root_(std::make_unique<const YamlNode>(read_yaml_file(file))) {}
+    : purpose_(Purpose::read),
+      root_(std::make_unique<const YamlNode>(read_yaml_file(file, files_))) {}
 
 ConfigKeys::~ConfigKeys() = default;
 
 Entry ConfigKeys::visit(const Body& describe) {
   Entry root{{"", ""}, Entry::Kind::section};
   enter(root, root_.get(), "", describe);
+  throw_errors();
   return root;
+}
+
+void ConfigKeys::report(const ConfigError& error) {
+  if (!frames_.empty()) frames_.back().failed = true;
+  errors_.push_back(error);
+}
+
+/// Unknown keys, each with the one that was probably meant, which then is not missing.
+void ConfigKeys::report_unknown() {
+  for (const Unknown& it : unknown_) {
+    const std::string& key = it.section->keys[it.index];
+    const std::string path = it.path.empty() ? key : fmt::format("{}.{}", it.path, key);
+    const Location& at = it.section->items[it.index].key_location;
+    std::set<std::string> taken;
+    const std::string section = without_indices(it.path);
+    for (const std::string& other : it.section->keys)
+      taken.insert(section.empty() ? other : fmt::format("{}.{}", section, other));
+    // "{a: 0,5}" is read as a: 0 and 5: nothing.
+    if (it.index > 0 && plain_number(key) &&
+        it.section->items[it.index].kind == YamlNode::Kind::nothing &&
+        it.section->items[it.index - 1].kind == YamlNode::Kind::scalar) {
+      const std::string& before = it.section->items[it.index - 1].text;
+      errors_.emplace_back(
+          *at.file, at.line,
+          path.substr(0, path.size() - key.size()) + it.section->keys[it.index - 1],
+          fmt::format("a decimal point ({}.{})", before, key),
+          fmt::format("a comma (\"{},{}\")", before, key));
+      continue;
+    }
+    const std::string meant = nearest_key(without_indices(path), declared_, taken);
+    std::erase_if(missing_, [&](const ConfigError& each) {
+      const std::string lacking = without_indices(each.key);
+      return lacking == meant || meant.starts_with(lacking + ".");
+    });
+    const bool here =
+        !meant.empty() && meant.size() > section.size() &&
+        meant.substr(0, section.size()) == section &&
+        meant.find('.', section.empty() ? 0 : section.size() + 1) == std::string::npos;
+    const std::string name = here ? meant.substr(section.empty() ? 0 : section.size() + 1) : meant;
+    errors_.emplace_back(*at.file, at.line, path,
+                         !meant.empty()     ? name
+                         : it.known.empty() ? "no keys"
+                                            : fmt::format("one of {}", fmt::join(it.known, ", ")),
+                         meant.empty() ? "an unknown key"
+                         : here        ? fmt::format("an unknown key (did you mean {}?)", name)
+                                : fmt::format("an unknown key here (did you mean {}?)", name));
+  }
+}
+
+void ConfigKeys::throw_errors() {
+  report_unknown();
+  errors_.insert(errors_.end(), missing_.begin(), missing_.end());
+  if (errors_.empty()) return;
+  const auto place = [this](const ConfigError& error) {
+    const auto file = std::find(files_.begin(), files_.end(), error.file);
+    return std::pair(file - files_.begin(), error.line);
+  };
+  std::stable_sort(errors_.begin(), errors_.end(),
+                   [&](const ConfigError& a, const ConfigError& b) { return place(a) < place(b); });
+  const auto same = [](const ConfigError& a, const ConfigError& b) {
+    return std::string_view(a.what()) == b.what();
+  };
+  errors_.erase(std::unique(errors_.begin(), errors_.end(), same), errors_.end());
+  throw ConfigErrors(errors_);
 }
 
 ConfigError ConfigKeys::error_at(const std::string& path, const std::string& expected,
@@ -179,14 +221,15 @@ const YamlNode* ConfigKeys::take(const Key& key, const std::string& expected) {
   if (!reading()) return nullptr;
   Frame& frame = frames_.back();
   frame.known.insert(key.name);
+  const std::string path = frame.path_of(key.name);
+  declared_.insert(without_indices(path));
   const YamlNode* node = frame.node->find(key.name);
   if (node != nullptr) {
-    locations_.insert_or_assign(frame.path_of(key.name), node->key_location);
-  } else if (key.presence == Presence::required && !frame.missing) {
+    locations_.insert_or_assign(path, node->key_location);
+  } else if (key.presence == Presence::required && !frame.quiet) {
     const Location& at = frame.node->key_location;
-    frame.missing.emplace(*at.file, at.line, frame.path_of(key.name), expected,
-                          "nothing: the key is missing");
-    frame.missing_key = key.name;
+    missing_.emplace_back(*at.file, at.line, path, expected, "nothing: the key is missing");
+    frame.failed = true;
   }
   return node;
 }
@@ -198,23 +241,38 @@ void ConfigKeys::enter(Entry& out, const YamlNode* node, const std::string& path
   if (!reading()) {
     body();
   } else {
-    if (node->kind != YamlNode::Kind::map) fail(*node, path, "a section");
-    const std::size_t index = frames_.size();
-    frames_.push_back({node, path});
-    try {
-      body();
-    } catch (const ConfigError&) {
-      // A missing key is the more likely fault, and its misspelling is more likely still.
-      const Frame& frame = frames_[index];
-      if (!frame.missing) throw;
-      frame.refuse_unknown(true);
-      throw *frame.missing;
-    }
-    frames_.back().refuse_unknown(false);
-    if (frames_.back().missing) throw *frames_.back().missing;
-    frames_.pop_back();
+    enter_section(node, path, body);
   }
   entries_ = outer;
+}
+
+/// Reads a section. What is wrong is noted, and what follows is read all the same.
+void ConfigKeys::enter_section(const YamlNode* node, const std::string& path, const Body& body) {
+  YamlNode none;
+  bool quiet = false;
+  if (node->kind != YamlNode::Kind::map) {
+    report({*node->location.file, node->location.line, path, "a section", node->describe()});
+    none.kind = YamlNode::Kind::map;
+    none.location = node->location;
+    none.key_location = node->key_location;
+    node = &none;
+    quiet = true;
+  }
+  const std::size_t index = frames_.size();
+  frames_.push_back({node, path, quiet || (index > 0 && frames_.back().quiet)});
+  const bool clean = errors_.empty() && missing_.empty();
+  try {
+    body();
+  } catch (const ConfigError& error) {
+    errors_.push_back(error);
+  } catch (const std::exception&) {  // of what follows from a wrong value
+    if (clean && errors_.empty() && missing_.empty()) throw;
+  }
+  Frame& frame = frames_[index];
+  for (std::size_t i = 0; i < node->keys.size(); ++i)
+    if (frame.kind_known && !frame.known.contains(node->keys[i]))
+      unknown_.push_back({node, i, path, {frame.known.begin(), frame.known.end()}});
+  frames_.resize(index);
 }
 
 void ConfigKeys::enter_items(Entry& out, const YamlNode* list, int count, const ItemBody& item) {
@@ -254,25 +312,45 @@ void ConfigKeys::either(const char* exact, const Body& exact_body, const char* f
     const YamlNode* node = frame.node->find(exact);
     as_exact = node != nullptr;
     if (as_exact && frame.node->find(friendly) != nullptr) {
-      throw ConfigError(*node->key_location.file, node->key_location.line, frame.path_of(exact),
-                        fmt::format("either {} or {}", exact, friendly), "both");
+      report({*node->key_location.file, node->key_location.line, frame.path_of(exact),
+              fmt::format("either {} or {}", exact, friendly), "both"});
     }
   }
   when(as_exact, exact_body);
   when(!as_exact, friendly_body);
 }
 
+void ConfigKeys::read_numbers(const YamlNode& node, const Key& key, const Form& form,
+                              const std::string& expected, std::vector<double>& numbers) {
+  const std::string path = frames_.back().path_of(key.name);
+  const bool scalar = node.kind == YamlNode::Kind::scalar;
+  const bool word_allowed = scalar && !(node.quoted && form.is_flag());
+  const Form::Word* word = word_allowed ? form.find(node.text) : nullptr;
+  if (word != nullptr) {
+    numbers = word->numbers;
+    return;
+  }
+  if (!form.numeric)
+    fail(node, path, expected, scalar ? likely_fix(node.text, node.quoted, form, "") : "");
+  const bool any_size = form.sized_by_keys && (!sizes_known_ || frames_.back().failed);
+  std::vector<double> read;
+  NumberReader{form, expected, key.unit(), any_size, read}.read(node, path, 0);
+  if (!any_size) numbers = std::move(read);
+}
+
 void ConfigKeys::visit_numbers(const Key& key, const Form& form, std::vector<double>& numbers) {
   const std::string expected = form.text(key.unit());
+  const std::size_t before = errors_.size() + missing_.size();
   if (const YamlNode* node = take(key, expected)) {
-    const std::string path = frames_.back().path_of(key.name);
-    const bool word_allowed =
-        node->kind == YamlNode::Kind::scalar && !(node->quoted && form.is_flag());
-    const Form::Word* word = word_allowed ? form.find(node->text) : nullptr;
-    if (word == nullptr && !form.numeric) fail(*node, path, expected);
-    numbers = word != nullptr ? word->numbers : std::vector<double>();
-    if (word == nullptr)
-      NumberReader{form, expected, key.unit() == "rad", numbers}.read(*node, path, 0);
+    try {
+      read_numbers(*node, key, form, expected, numbers);
+    } catch (const ConfigError& error) {  // the variable keeps its value
+      report(error);
+    }
+  }
+  if (errors_.size() + missing_.size() > before) {  // what follows from this value is not known
+    if (form.whole && form.sizes.empty()) sizes_known_ = false;
+    if (!form.numeric && !form.is_flag()) frames_.back().kind_known = false;
   }
   Entry& entry = add(key, Entry::Kind::numbers);
   entry.form = form;
@@ -286,10 +364,16 @@ void ConfigKeys::visit_text(const Key& key, const Form& length, std::string& val
     const bool printable = std::none_of(node->text.begin(), node->text.end(), [](char c) {
       return static_cast<unsigned char>(c) < 0x20 || c == 0x7f;
     });
-    if (node->kind != YamlNode::Kind::scalar || !printable ||
-        !length.contains(static_cast<double>(node->text.size())))
-      fail(*node, frames_.back().path_of(key.name), expected);
-    value = node->text;
+    const bool good = node->kind == YamlNode::Kind::scalar && printable && is_utf8(node->text) &&
+                      length.contains(static_cast<double>(node->text.size()));
+    if (good) {
+      value = node->text;
+    } else {
+      const bool other = node->kind == YamlNode::Kind::scalar && !is_utf8(node->text);
+      report({*node->location.file, node->location.line, frames_.back().path_of(key.name), expected,
+              other ? "bytes that are not UTF-8: save the file as UTF-8, it may be Latin-1"
+                    : node->describe()});
+    }
   }
   Entry& entry = add(key, Entry::Kind::text);
   entry.form = length;
@@ -301,16 +385,16 @@ void ConfigKeys::section(const Key& key, const Body& body) {
   Entry& entry = add(key, Entry::Kind::section);
   if (!reading()) return enter(entry, nullptr, "", body);
   const Frame& frame = frames_.back();
-  if (node == nullptr && key.presence == Presence::required) {  // what follows may depend on it
-    frame.refuse_unknown(true);
-    throw *frame.missing;
-  }
+  const bool absent = node == nullptr && key.presence == Presence::required;
+  if (absent) sizes_known_ = false;
   // One that is left out is visited too: its defaults may depend on what was read before.
   YamlNode empty;
   empty.kind = YamlNode::Kind::map;
   empty.location = frame.node->location;
   empty.key_location = frame.node->key_location;
-  enter(entry, node != nullptr ? node : &empty, frame.path_of(key.name), body);
+  const bool quiet = std::exchange(frames_.back().quiet, frame.quiet || absent);
+  enter(entry, node != nullptr ? node : &empty, frames_.back().path_of(key.name), body);
+  frames_.back().quiet = quiet;
 }
 
 void ConfigKeys::visit_list(const Key& key, int size, const ItemBody& resize,
@@ -318,10 +402,12 @@ void ConfigKeys::visit_list(const Key& key, int size, const ItemBody& resize,
   const YamlNode* node = take(key, "a list of sections");
   if (node != nullptr) {
     const std::size_t count = node->items.size();
-    if (node->kind != YamlNode::Kind::list || count == 0 || count > kLongestList) {
-      fail(*node, frames_.back().path_of(key.name),
-           fmt::format("a list of 1 to {} sections", kLongestList));
-    }
+    if (node->kind != YamlNode::Kind::list || count == 0 || count > kLongestList)
+      return report({*node->location.file, node->location.line, frames_.back().path_of(key.name),
+                     fmt::format("a list of 1 to {} sections", kLongestList),
+                     node->kind == YamlNode::Kind::map
+                         ? "a section (begin its first key with \"- \")"
+                         : node->describe()});
     resize(size = static_cast<int>(count));
   }
   if (purpose_ == Purpose::schema && size == 0) resize(size = 1);
@@ -333,9 +419,13 @@ void ConfigKeys::visit_one_or_each(const Key& key, int count, bool all_equal,
   const YamlNode* node = take(key, "a section");
   const bool one = node != nullptr && node->kind == YamlNode::Kind::map;
   if (node != nullptr && !one &&
-      (node->kind != YamlNode::Kind::list || node->items.size() != static_cast<std::size_t>(count)))
-    fail(*node, frames_.back().path_of(key.name),
-         fmt::format("one section or a list of {}", count));
+      (node->kind != YamlNode::Kind::list ||
+       node->items.size() != static_cast<std::size_t>(count))) {
+    if (node->kind != YamlNode::Kind::list || sizes_known_)
+      report({*node->location.file, node->location.line, frames_.back().path_of(key.name),
+              fmt::format("one section or a list of {}", count), node->describe()});
+    return;
+  }
   if (node != nullptr || !reading())
     enter_items(add(key, Entry::Kind::one_or_each), node, reading() || !all_equal ? count : 1,
                 item);

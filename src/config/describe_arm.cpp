@@ -1,9 +1,30 @@
 // The keys of the arm and its chambers, of sensing and control, and the experiment as a whole.
+#include <algorithm>
 #include <numeric>
 
 #include "config/describe.hpp"
 
 namespace softarm {
+
+/// Which segments stretch: one flag for all, or 1 or 0 for every segment.
+static void describe_stretch(Keys& key, ArmParameters& it) {
+  const auto n = static_cast<std::size_t>(it.size());
+  std::vector<int> stretches;
+  for (const auto& segment : it.segments) {
+    stretches.push_back(it.extensible && !segment.constant_length ? 1 : 0);
+  }
+  const Form flags = from(0, 1)
+                         .one_or_each()
+                         .or_word("false", std::vector(n, 0.0))
+                         .or_word("true", std::vector(n, 1.0));
+  key("extensible", stretches, flags,
+      "whether segments stretch: then a segment's state is [u_x, u_y, e]; or 1 or 0 for every "
+      "segment");
+  it.extensible = std::any_of(stretches.begin(), stretches.end(), [](int s) { return s == 1; });
+  for (std::size_t i = 0; i < n; ++i) {
+    it.segments[i].constant_length = it.extensible && stretches[i] == 0;
+  }
+}
 
 void describe_arm(Keys& key, ArmParameters& it, Presence presence) {
   const auto each = [&](const char* name, double SegmentParameters::*member, const Form& range,
@@ -23,6 +44,12 @@ void describe_arm(Keys& key, ArmParameters& it, Presence presence) {
   each("radius_m", &Segment::radius_m, from(0, 1),
        "of the round cross-section, for its rotary inertia; 0: left out, as in the paper",
        Presence::optional);
+  describe_stretch(key, it);
+  each("axial_stiffness_n_per_m", &Segment::axial_stiffness_n_per_m, from(0, 1e7),
+       "k_a of segments that stretch; of a solid rod 4 k over radius squared", Presence::optional);
+  each("axial_damping_ns_per_m", &Segment::axial_damping_ns_per_m, from(0, 1e6),
+       "beta_a of segments that stretch; beta_a / k_a = beta / k where the section is homogeneous",
+       Presence::optional);
   key("mass_model", it.mass, one_of({"point", "distributed"}),
       "point: the paper's masses at the centres of mass; distributed: along the arc");
   key("actuation_model", it.actuation, one_of({"chamber", "couple"}),
@@ -37,18 +64,23 @@ void describe_arm(Keys& key, ArmParameters& it, Presence presence) {
 }
 
 static void describe_chambers(Keys& key, std::vector<Chamber>& it, Presence presence) {
-  std::vector<double> angles, gains;
+  std::vector<double> angles, gains, offsets;
   for (const Chamber& chamber : it) {
     angles.push_back(chamber.angle_rad);
     gains.push_back(chamber.gain_nm_per_bar);
+    offsets.push_back(chamber.offset_m);
   }
   key("angle_rad", angles, from(-kTwoPi, kTwoPi).list(),
       "direction chi of every chamber about the segment's axis", presence);
   gains.resize(angles.size(), gains.empty() ? 0.0 : gains.front());
   key("gain_nm_per_bar", gains, above(0, kMany).one_or_each(),
       "bending moment a bar, of all or of every chamber", presence);
+  offsets.resize(angles.size(), offsets.empty() ? Chamber{}.offset_m : offsets.front());
+  key("offset_m", offsets, above(0, 1).one_or_each(),
+      "of the chambers from the segment's axis; gain over offset is the effective area, which "
+      "lengthens segments that stretch");
   it.resize(angles.size());
-  for (std::size_t j = 0; j < angles.size(); ++j) it[j] = {angles[j], gains[j]};
+  for (std::size_t j = 0; j < angles.size(); ++j) it[j] = {angles[j], gains[j], offsets[j]};
 }
 
 /// What is named `_bar` counts N m.
@@ -129,8 +161,12 @@ static void describe(Keys& key, ControlTerms& it) {
 
 static void describe(Keys& key, TaskSpaceSettings& it) {
   KEY(lambda_1ps, above(0, 1e3), "both poles of the tip's error are at -lambda");
-  KEY(tip_bandwidth_radps, above(0, 1e4), "of the filter on measured tip minus reference");
+  KEY(tip_bandwidth_radps, above(0, 1e4),
+      "of the filter on measured tip minus reference: the only loop of the tip that is closed over "
+      "the arm, so below its slowest mode");
   KEY(posture_rate_1ps, from(0, 100), "of drifting to less bend where the tip does not move");
+  KEY(map_rate_1ps, from(0, 100),
+      "of learning how that difference depends on the place; 0: not learnt");
 }
 
 static void describe(Keys& key, ControllerSettings& it) {
@@ -178,6 +214,17 @@ static void describe_identification(Keys& key, IdentificationSettings& it, Motio
   key("delay_s", it.dead_time_s, from(-1, 100), "from set point to frame, likewise");
 }
 
+static void describe_uncertainty(Keys& key, Experiment& experiment) {
+  ArmUncertainty& it = experiment.uncertainty;
+  KEY(parameters, from(0, 0.5), "of stiffness, damping, mass, length and gain, relative");
+  if (key.reading()) {
+    it.payload_kg = 0.0;
+    for (const SegmentParameters& segment : experiment.arm.segments)
+      it.payload_kg += 0.1 * segment.mass_kg;
+  }
+  KEY(payload_kg, from(0, 100), "at the tip, at most; left out: a tenth of the arm's mass");
+}
+
 void describe(Keys& key, Experiment& it) {
   KEY(name, from(1, 100), "of the experiment, for logs and plots", kRequired);
   KEY(seed, from(0, 9007199254740992.0), "of every random number of the simulated arm");
@@ -186,6 +233,9 @@ void describe(Keys& key, Experiment& it) {
     key("segments", key.segments, from(1, kMaxSegments), "how many", kRequired);
     it.arm.segments.resize(static_cast<std::size_t>(key.segments));
     describe_arm(key, it.arm, kRequired);
+    key.section(
+        {"uncertainty", "how far the arm may differ from what is configured, for the check"},
+        [&] { describe_uncertainty(key, it); });
   });
   key.section({"actuation", "chambers and the limits of their valves", kRequired},
               [&] { describe_actuation(key, it.actuation, kRequired); });

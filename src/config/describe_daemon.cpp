@@ -53,6 +53,17 @@ static void describe(Keys& key, SafetySettings& it) {
   KEY(curvature_residual_nm, from(0, 1e4),
       "|K u + G - A tau_A| of a segment above it: FAULT; 0: not checked");
   KEY(curvature_settling_s, above(0, 5), "for so long without interruption");
+  KEY(oscillation_rad, from(0, 1),
+      "amplitude of a coordinate's error that oscillates and does not fade: VENT; 0: not checked");
+  KEY(oscillation_periods, from(1, 20), "for so many periods");
+  KEY(oscillation_lowest_hz, above(0, 1e3), "slower ones do not count");
+  KEY(oscillation_part, from(0, 100),
+      "of what the reference itself does meanwhile: a smaller error follows the reference");
+  KEY(length_warning, from(0, 1),
+      "a segment's measured length off arm.length_m by more, over that: the status reports it; 0: "
+      "not checked");
+  KEY(length_fault, from(0, 1), "the same: FAULT; 0: not checked");
+  KEY(length_settling_s, above(0, 5), "for so long without interruption");
   KEY(deadman_timeout_s, above(0, 2), "without a go on lcm.deadman_channel: VENT");
 }
 

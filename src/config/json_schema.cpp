@@ -11,6 +11,8 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
+const std::string kFactor = R"(\+?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?)";
+
 /// 3 instead of 3.0.
 Json number(double value) {
   constexpr double kExact = 9007199254740992.0;
@@ -23,12 +25,16 @@ Json any_of(const std::vector<Json>& schemas) {
   return schemas.size() == 1 ? schemas.front() : Json{{"anyOf", schemas}};
 }
 
-/// What one number may be: itself, or a multiple of pi where it is an angle.
+/// What one number may be: itself, one over another, or a multiple of pi where it is an angle.
 void number_schemas(const Form& form, bool angle, std::vector<Json>& out) {
   Json plain = {{"type", form.whole ? "integer" : "number"}};
   if (form.low > -std::numeric_limits<double>::max())
     plain[form.above_low ? "exclusiveMinimum" : "minimum"] = number(form.low);
   if (form.high < std::numeric_limits<double>::max()) plain["maximum"] = number(form.high);
+  if (!form.whole) {
+    plain["type"] = {"number", "string"};
+    plain["pattern"] = "^[-+]?" + kFactor + "/" + kFactor + "$";
+  }
   out.push_back(plain);
   if (angle) out.push_back({{"$ref", "#/definitions/multiple_of_pi"}});
 }
@@ -45,13 +51,19 @@ void numbers_schemas(const Form& form, bool angle, std::size_t depth, std::vecto
   out.push_back(list);
 }
 
+/// YAML reads false and true as flags, other words as text.
+Json word_json(const std::string& word) {
+  if (word == "false" || word == "true") return word == "true";
+  return word;
+}
+
 /// A default as it would be written; null where its size follows from other keys.
 Json default_of(const Entry& entry) {
   const Form& form = entry.form;
   if (entry.kind == Entry::Kind::text) return entry.text;
   if (entry.numbers.empty()) return {};
   if (form.is_flag()) return entry.numbers.front() != 0.0;
-  if (const auto* word = form.find(entry.numbers)) return word->text;
+  if (const auto* word = form.find(entry.numbers)) return word_json(word->text);
   const std::set<double> different(entry.numbers.begin(), entry.numbers.end());
   if (form.sizes.empty() || (form.one_for_all && different.size() == 1))
     return number(entry.numbers.front());
@@ -71,7 +83,7 @@ Json value_schema(const Entry& entry, bool in_list) {
   }
   if (form.is_flag()) return {{"type", "boolean"}};
   Json words = Json::array();
-  for (const Form::Word& word : form.words) words.push_back(word.text);
+  for (const Form::Word& word : form.words) words.push_back(word_json(word.text));
   if (!form.numeric && in_list && entry.required())
     return {{"const", words.at(static_cast<std::size_t>(entry.numbers.front()))}};
   std::vector<Json> schemas;
@@ -137,9 +149,8 @@ std::string json_schema_text(const Entry& root) {
       {"type", "string"},
       {"minLength", 1},
       {"description", "a file, relative to this one, with the keys that this one leaves out"}};
-  const std::string factor = R"(\+?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?)";
   schema["definitions"]["multiple_of_pi"] = {
-      {"type", "string"}, {"pattern", "^[-+]?(" + factor + R"(\*)?pi(/)" + factor + ")?$"}};
+      {"type", "string"}, {"pattern", "^[-+]?(" + kFactor + R"(\*)?pi(/)" + kFactor + ")?$"}};
   schema["if"] = {{"required", {"include"}}};
   schema["else"] = needs_of(root);
   return schema.dump(2) + "\n";

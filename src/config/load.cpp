@@ -58,6 +58,7 @@ Experiment read(const std::filesystem::path& file) {
   if (!keys.given("daemon.safety.arming") && drives_real_valves(experiment))
     experiment.safety.arming = Arming::explicit_;
   check_consistency(experiment, keys);
+  experiment.files = keys.files();
   experiment.hash = fnv1a(resolved_text(experiment));
   return experiment;
 }
@@ -84,7 +85,7 @@ std::string template_text() {
 #
 # A key that is not marked as required may be left out and then has the value shown here, or that of its text. Unknown
 # and repeated keys, wrong types and values out of range are refused. Angles are radians and may be written as multiples
-# of pi: pi/2, -pi, 3*pi/4, 0.2*pi/180. `include: FILE` (relative to this file) takes over the keys of FILE; those
+# of pi: pi/2, -pi, 3*pi/4, 0.2*pi/180; any number as a fraction: 1/120. `include: FILE` (relative to this file) takes over the keys of FILE; those
 # of this file win, key by key. Editors with a YAML language server complete and check a file whose first line names the
 # schema, as in this file: `softarm check --schema > experiment.schema.json`.
 

@@ -2,13 +2,19 @@
 
 #include <cstring>
 #include <fstream>
+#include <sstream>
 #include <string>
+#include <system_error>
 #include <utility>
 
 namespace softarm {
 namespace {
 
-constexpr int kMostIncludes = 8;  ///< nested
+/// A hostile file must not keep anybody from stopping an arm.
+struct Budget {
+  int files = 16;
+  std::size_t bytes = 1'000'000;
+};
 
 /// The value after "KEY:" in a line of YAML, or "".
 std::string value_of(const std::string& key, const std::string& line) {
@@ -20,15 +26,22 @@ std::string value_of(const std::string& key, const std::string& line) {
 }
 
 /// These keys occur nowhere else in an experiment.
-void read(const std::filesystem::path& file, int includes_left, LcmSettings& lcm) {
+void read(const std::filesystem::path& file, Budget& left, LcmSettings& lcm) {
   const std::pair<const char*, std::string*> keys[] = {{"url", &lcm.url},
                                                        {"operator_channel", &lcm.operator_channel},
                                                        {"status_channel", &lcm.status_channel}};
-  std::ifstream text(file);
+  std::error_code code;
+  if (left.files-- <= 0 || !std::filesystem::is_regular_file(file, code)) return;
+  std::ifstream stream(file);
+  std::string all(left.bytes, '\0');
+  stream.read(all.data(), static_cast<std::streamsize>(all.size()));
+  all.resize(static_cast<std::size_t>(stream.gcount()));
+  left.bytes -= all.size();
+  std::istringstream text(all);
   for (std::string line; std::getline(text, line);) {
     line = line.substr(0, line.find('#'));
-    if (const std::string other = value_of("include", line); !other.empty() && includes_left > 0)
-      read(file.parent_path() / other, includes_left - 1, lcm);
+    if (const std::string other = value_of("include", line); !other.empty())
+      read(file.parent_path() / other, left, lcm);
     for (const auto& [key, setting] : keys)
       if (const std::string value = value_of(key, line); !value.empty()) *setting = value;
   }
@@ -38,7 +51,8 @@ void read(const std::filesystem::path& file, int includes_left, LcmSettings& lcm
 
 LcmSettings find_network(const std::filesystem::path& file) {
   LcmSettings lcm;
-  read(file, kMostIncludes, lcm);
+  Budget budget;
+  read(file, budget, lcm);
   return lcm;
 }
 

@@ -14,6 +14,7 @@
 #include "softarm/model/statics.hpp"
 #include "softarm/runtime/safety_monitor.hpp"
 #include "softarm/runtime/settings.hpp"
+#include "softarm/transport/lcm_node.hpp"
 
 namespace softarm {
 namespace {
@@ -87,6 +88,9 @@ LoopSampling sampling_of(const Experiment& experiment) {
 std::vector<std::string> experiment_warnings(const Experiment& experiment) {
   auto warnings = gain_warnings(experiment.arm, experiment.control, sampling_of(experiment),
                                 largest_theta_rad(experiment.reference));
+
+  if (const std::string other = network_warning(experiment.transport.lcm.url); !other.empty())
+    warnings.push_back(other);
 
   StaticReach reach(experiment);
   for (std::size_t i = 0; i < experiment.reference.phases.size(); ++i) {

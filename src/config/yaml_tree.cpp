@@ -8,9 +8,11 @@
 
 #include <algorithm>
 #include <fstream>
+#include <map>
 #include <sstream>
 #include <system_error>
 
+#include "config/hints.hpp"
 #include "softarm/config/config_error.hpp"
 
 namespace softarm {
@@ -18,7 +20,8 @@ namespace {
 
 constexpr std::size_t kMaxFileBytes = 1 << 20;
 constexpr std::size_t kMaxDepth = 16;
-constexpr int kMaxIncludes = 8;
+constexpr std::size_t kMaxIncludes = 8;
+constexpr std::size_t kMaxAliased = 10000;  ///< nodes that come from aliases
 
 using FileName = std::shared_ptr<const std::string>;
 
@@ -40,33 +43,40 @@ class TreeBuilder : public YAML::EventHandler {
 
   void OnDocumentStart(const YAML::Mark&) override {}
   void OnDocumentEnd() override {}
-  void OnAnchor(const YAML::Mark& mark, const std::string& name) override {
-    fail(mark, "no anchors or aliases", "&" + name);
-  }
-  void OnAlias(const YAML::Mark& mark, YAML::anchor_t) override {
-    fail(mark, "no anchors or aliases", "an alias");
+  void OnAnchor(const YAML::Mark&, const std::string&) override {}
+  /// A copy of what is at the anchor, within a bound: copies of copies double.
+  void OnAlias(const YAML::Mark& mark, YAML::anchor_t anchor) override {
+    const auto at = anchors_.find(anchor);
+    if (at == anchors_.end())
+      fail(mark, fmt::format("an anchor that is complete, of at most {} values", kMaxAliased),
+           "another");
+    YamlNode copy = at->second;
+    copy.location = copy.key_location = node(mark, copy.kind).location;
+    aliased_ += size_of(copy);
+    if (aliased_ > kMaxAliased)
+      fail(mark, fmt::format("aliases of at most {} values in all", kMaxAliased), "more");
+    add(mark, std::move(copy));
   }
   void OnNull(const YAML::Mark& mark, YAML::anchor_t anchor) override {
-    check(mark, "", anchor);
-    add(mark, node(mark, YamlNode::Kind::nothing));
+    add(mark, anchored(node(mark, YamlNode::Kind::nothing), anchor));
   }
   void OnScalar(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t anchor,
                 const std::string& value) override {
-    check(mark, tag, anchor);
+    check(mark, tag);
     YamlNode scalar = node(mark, YamlNode::Kind::scalar);
     scalar.text = value;
     scalar.quoted = tag == "!";
-    add(mark, std::move(scalar));
+    add(mark, anchored(std::move(scalar), anchor));
   }
   void OnSequenceStart(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t anchor,
                        YAML::EmitterStyle::value) override {
-    check(mark, tag, anchor);
-    open(mark, YamlNode::Kind::list);
+    check(mark, tag);
+    open(mark, YamlNode::Kind::list, anchor);
   }
   void OnMapStart(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t anchor,
                   YAML::EmitterStyle::value) override {
-    check(mark, tag, anchor);
-    open(mark, YamlNode::Kind::map);
+    check(mark, tag);
+    open(mark, YamlNode::Kind::map, anchor);
   }
   void OnSequenceEnd() override { close(); }
   void OnMapEnd() override { close(); }
@@ -76,6 +86,7 @@ class TreeBuilder : public YAML::EventHandler {
     YamlNode node;
     bool key_pending = false;  ///< a map's key has come, its value has not
     Location key_location;
+    YAML::anchor_t anchor = YAML::NullAnchor;
   };
 
   YamlNode node(const YAML::Mark& mark, YamlNode::Kind kind) const {
@@ -103,17 +114,28 @@ class TreeBuilder : public YAML::EventHandler {
     throw ConfigError(*file_, mark.line + 1, path(), expected, got);
   }
 
-  void check(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t anchor) const {
-    if (anchor != YAML::NullAnchor) fail(mark, "no anchors or aliases", "an anchor");
+  static std::size_t size_of(const YamlNode& node) {
+    std::size_t size = 1;
+    for (const YamlNode& item : node.items) size += size_of(item);
+    return size;
+  }
+
+  YamlNode anchored(YamlNode&& made, YAML::anchor_t anchor) {
+    if (anchor != YAML::NullAnchor && size_of(made) <= kMaxAliased)
+      anchors_.insert_or_assign(anchor, made);
+    return std::move(made);
+  }
+
+  void check(const YAML::Mark& mark, const std::string& tag) const {
     if (!tag.empty() && tag != "?" && tag != "!") fail(mark, "no tags", quoted_excerpt(tag));
   }
 
-  void open(const YAML::Mark& mark, YamlNode::Kind kind) {
+  void open(const YAML::Mark& mark, YamlNode::Kind kind, YAML::anchor_t anchor) {
     if (levels_.size() >= kMaxDepth) {
       fail(mark, fmt::format("at most {} levels", kMaxDepth), "more");
     }
     if (awaits_key()) fail(mark, "a word as key", "a list or section");
-    levels_.push_back({node(mark, kind), false, {}});
+    levels_.push_back({node(mark, kind), false, {}, anchor});
   }
 
   bool awaits_key() const {
@@ -155,14 +177,16 @@ class TreeBuilder : public YAML::EventHandler {
   }
 
   void close() {
-    YamlNode done = std::move(levels_.back().node);
+    Level level = std::move(levels_.back());
     levels_.pop_back();
-    add_value(std::move(done));
+    add_value(anchored(std::move(level.node), level.anchor));
   }
 
   FileName file_;
   std::vector<Level> levels_;
   YamlNode root_;
+  std::map<YAML::anchor_t, YamlNode> anchors_;
+  std::size_t aliased_ = 0;
 };
 
 std::string read_text(const std::filesystem::path& file) {
@@ -172,8 +196,9 @@ std::string read_text(const std::filesystem::path& file) {
     throw ConfigError(file.string(), 0, "", "a configuration file (config/ holds examples)",
                       "no such file");
   }
-  if (std::filesystem::is_directory(status)) {
-    throw ConfigError(file.string(), 0, "", "a configuration file", "a folder");
+  if (!std::filesystem::is_regular_file(status)) {  // a pipe would be waited for
+    throw ConfigError(file.string(), 0, "", "a configuration file",
+                      std::filesystem::is_directory(status) ? "a folder" : "a pipe or a device");
   }
   std::ifstream stream(file, std::ios::binary);
   std::string text(kMaxFileBytes + 1, '\0');
@@ -190,7 +215,13 @@ std::string read_text(const std::filesystem::path& file) {
 
 YamlNode parse(const std::filesystem::path& file) {
   const auto name = std::make_shared<const std::string>(file.string());
-  std::istringstream stream(read_text(file));
+  const std::string text = read_text(file);
+  const auto refuse = [&](int line, const std::string& expected, const std::string& got) {
+    if (const auto fault = find_text_fault(text))
+      throw ConfigError(*name, fault->line, fault->key, fault->expected, fault->got);
+    throw ConfigError(*name, line, "", expected, got);
+  };
+  std::istringstream stream(text);
   TreeBuilder builder(name);
   try {
     YAML::Parser parser(stream);
@@ -200,14 +231,11 @@ YamlNode parse(const std::filesystem::path& file) {
       throw ConfigError(*name, 0, "", "one YAML document", "several (a line \"---\")");
     }
   } catch (const YAML::Exception& error) {
-    throw ConfigError(*name, error.mark.is_null() ? 0 : error.mark.line + 1, "", "valid YAML",
-                      error.msg);
+    refuse(error.mark.is_null() ? 0 : error.mark.line + 1, "valid YAML", error.msg);
   }
   YamlNode root = builder.take_root();
-  if (root.kind != YamlNode::Kind::map) {
-    throw ConfigError(*name, std::max(1, root.location.line), "", "sections (key: value)",
-                      root.describe());
-  }
+  if (root.kind != YamlNode::Kind::map)
+    refuse(std::max(1, root.location.line), "sections (key: value)", root.describe());
   return root;
 }
 
@@ -230,7 +258,23 @@ void merge(YamlNode& base, YamlNode&& over) {
   }
 }
 
-YamlNode read_with_includes(const std::filesystem::path& file, int depth) {
+/// A file that `from` includes: relative to its name or, where that is a link, to the file itself.
+std::filesystem::path included_by(const std::filesystem::path& from, const std::string& name,
+                                  std::string& looked_for) {
+  std::error_code code;
+  std::filesystem::path first = from.parent_path() / name;
+  const std::filesystem::path real = std::filesystem::canonical(from, code).parent_path() / name;
+  looked_for = "no file " + first.string();
+  if (std::filesystem::is_regular_file(first, code)) return first;
+  if (code || !std::filesystem::equivalent(real.parent_path(), first.parent_path(), code) || code)
+    looked_for += " and none " + real.string();
+  return std::filesystem::is_regular_file(real, code) ? real : std::filesystem::path();
+}
+
+/// `chain`: the files that include one another, this one last; `files`: all read.
+YamlNode read_with_includes(const std::filesystem::path& file, Files& chain, Files& files) {
+  files.push_back(file);
+  chain.push_back(file);
   YamlNode root = parse(file);
   const auto at = std::find(root.keys.begin(), root.keys.end(), "include");
   if (at == root.keys.end()) return root;
@@ -242,13 +286,19 @@ YamlNode read_with_includes(const std::filesystem::path& file, int depth) {
     throw ConfigError(*include.location.file, include.location.line, "include", expected, got);
   };
   if (include.kind != YamlNode::Kind::scalar) fail("the name of a file", include.describe());
-  if (depth >= kMaxIncludes) fail(fmt::format("at most {} nested includes", kMaxIncludes), "more");
-  const auto included = file.parent_path() / include.text;
+  std::string looked_for;
+  const auto included = included_by(file, include.text, looked_for);
+  if (included.empty())
+    fail("an existing file, relative to this one",
+         fmt::format("{} ({})", quoted_excerpt(include.text), looked_for));
   std::error_code code;
-  if (!std::filesystem::is_regular_file(included, code)) {
-    fail("an existing file, relative to this one", quoted_excerpt(include.text));
-  }
-  YamlNode base = read_with_includes(included, depth + 1);
+  for (const auto& outer : chain)
+    if (std::filesystem::equivalent(outer, included, code))
+      fail("a file that does not include this one again",
+           fmt::format("{}, a circle", quoted_excerpt(include.text)));
+  if (chain.size() > kMaxIncludes)
+    fail(fmt::format("at most {} nested includes", kMaxIncludes), "more");
+  YamlNode base = read_with_includes(included, chain, files);
   merge(base, std::move(root));
   return base;
 }
@@ -274,6 +324,9 @@ std::string YamlNode::describe() const {
   return "nothing";
 }
 
-YamlNode read_yaml_file(const std::filesystem::path& file) { return read_with_includes(file, 0); }
+YamlNode read_yaml_file(const std::filesystem::path& file, Files& files) {
+  Files chain;
+  return read_with_includes(file, chain, files);
+}
 
 }  // namespace softarm

@@ -1,5 +1,5 @@
-// A YAML file as a plain tree with the location of every node. Stricter than YAML: no aliases, no
-// tags, no duplicate keys, bounded depth and size; `include: FILE` at the top is merged in.
+// A YAML file as a plain tree with the location of every node. Stricter than YAML: no tags, no
+// duplicate keys, bounded depth and size, aliases copied within a bound; `include: FILE` at the top is merged in.
 #pragma once
 
 #include <filesystem>
@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "softarm/base/output_file.hpp"
 #include "softarm/config/config_keys.hpp"
 
 namespace softarm {
@@ -29,7 +30,8 @@ struct YamlNode {
 };
 
 /// Reads a file with everything it includes; values of the including file win, maps are merged key
-/// by key. The root is a map. @throws ConfigError, no other exception
-YamlNode read_yaml_file(const std::filesystem::path& file);
+/// by key. The root is a map. @param files  gets the name of every file read
+/// @throws ConfigError, no other exception
+YamlNode read_yaml_file(const std::filesystem::path& file, Files& files);
 
 }  // namespace softarm

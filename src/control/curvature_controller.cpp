@@ -89,6 +89,7 @@ CurvatureController::CurvatureController(const ArmParameters& arm,
       integral_(SegmentVector::Zero(arm.dof())),
       horizontal_(arm),
       integrates_(!ki_.isZero(0.0)) {
+  expect_constant_length(arm, "control");
   if (!std::isfinite(settings.valve_lag_s) || settings.valve_lag_s < 0.0) {
     throw std::invalid_argument(
         fmt::format("control, valve_lag_s: expected a time >= 0, got {}", settings.valve_lag_s));

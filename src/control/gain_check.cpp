@@ -19,19 +19,20 @@ namespace {
 
 constexpr double kLargestFactor = 1e3;
 constexpr double kMargin = 1.25;
+constexpr int kMostModes = 24;  ///< of a plane; longer arms are reduced to so many
 
 /// What the gains of one bending plane are judged by.
 struct Judged {
   BendingPlane plane;
-  Eigen::VectorXd kp, kd;
+  double largest_kp;
   bool gravity_fed_back;
 
   bool stable(const LoopSampling& sampling, double factor) const {
-    return loop_growth_1ps(plane, sampling, factor * kp, factor * kd, gravity_fed_back) < 0.0;
+    return loop_growth_1ps(plane, sampling, factor, gravity_fed_back) < 0.0;
   }
 
   double largest_factor(const LoopSampling& sampling) const {
-    if (kp.isZero(0.0) && kd.isZero(0.0)) return kLargestFactor;
+    if (plane.kp.isZero(0.0) && plane.kd.isZero(0.0)) return kLargestFactor;
     double low = 1e-3, high = kLargestFactor;
     if (stable(sampling, high)) return high;
     if (!stable(sampling, low)) return 0.0;
@@ -58,6 +59,7 @@ Eigen::VectorXd of_plane(const Eigen::VectorXd& vector, int axis) {
 
 std::array<Judged, 2> judged_planes(const ArmParameters& arm, const Eigen::VectorXd& kp,
                                     const Eigen::VectorXd& kd, bool gravity_fed_back) {
+  expect_constant_length(arm, "gain check");
   const int n = arm.size(), dof = arm.dof();
   if (kp.size() != dof || kd.size() != dof) {
     throw std::invalid_argument(
@@ -74,15 +76,17 @@ std::array<Judged, 2> judged_planes(const ArmParameters& arm, const Eigen::Vecto
     Judged& judged = planes[static_cast<std::size_t>(axis)];
     judged.plane.inverse_inertia = of_plane(B, axis).llt().solve(Eigen::MatrixXd::Identity(n, n));
     judged.plane.gravity_slope = of_plane(slope, axis);
-    judged.plane.stiffness.resize(n);
-    judged.plane.damping.resize(n);
+    judged.plane.stiffness.setZero(n, n);
+    judged.plane.damping.setZero(n, n);
     for (int i = 0; i < n; ++i) {
       const SegmentParameters& segment = arm.segments[static_cast<std::size_t>(i)];
-      judged.plane.stiffness[i] = segment.stiffness_nm_per_rad;
-      judged.plane.damping[i] = segment.damping_nms_per_rad;
+      judged.plane.stiffness(i, i) = segment.stiffness_nm_per_rad;
+      judged.plane.damping(i, i) = segment.damping_nms_per_rad;
     }
-    judged.kp = of_plane(kp, axis);
-    judged.kd = of_plane(kd, axis);
+    judged.plane.kp = of_plane(kp, axis).asDiagonal();
+    judged.plane.kd = of_plane(kd, axis).asDiagonal();
+    judged.largest_kp = of_plane(kp, axis).maxCoeff();
+    if (n > kMostModes) judged.plane = reduced(judged.plane, kMostModes);
     judged.gravity_fed_back = gravity_fed_back;
   }
   return planes;
@@ -109,6 +113,7 @@ std::string explain(const LoopSampling& sampling, double kp, double factor,
 
 Eigen::Matrix3d tip_compliance(const ArmParameters& arm, const Eigen::VectorXd& u,
                                const Eigen::VectorXd& kp_u, bool gravity_fed_back) {
+  expect_constant_length(arm, "tip compliance");
   const int dof = arm.dof();
   if (u.size() != dof || kp_u.size() != dof) {
     throw std::invalid_argument(fmt::format(
@@ -129,8 +134,7 @@ double loop_growth_1ps(const ArmParameters& arm, const LoopSampling& sampling,
                        bool gravity_fed_back) {
   double growth = -std::numeric_limits<double>::infinity();
   for (const Judged& each : judged_planes(arm, kp_u, kd_u, gravity_fed_back)) {
-    growth = std::max(
-        growth, loop_growth_1ps(each.plane, sampling, each.kp, each.kd, each.gravity_fed_back));
+    growth = std::max(growth, loop_growth_1ps(each.plane, sampling, 1.0, each.gravity_fed_back));
   }
   return growth;
 }
@@ -168,8 +172,7 @@ std::vector<std::string> gain_warnings(const ArmParameters& arm, const Controlle
       what = fmt::format("gains of phi (K_P / theta^2 at theta = {:.3g} rad)", theta);
     }
     if (polar && axis == 1) what = "gains of theta";
-    warnings.push_back(
-        explain(sampling, judged.kp.maxCoeff(), judged.largest_factor(sampling), what));
+    warnings.push_back(explain(sampling, judged.largest_kp, judged.largest_factor(sampling), what));
   }
   return warnings;
 }

@@ -224,6 +224,7 @@ Reference::Reference(const ReferenceSettings& settings, const ControllerSettings
 Reference::Reference(const ReferenceSettings& settings, const ControllerSettings& control,
                      const ArmParameters& arm)
     : state_(std::make_unique<State>()) {
+  expect_constant_length(arm, "reference");
   const int segments = arm.size();
   if (segments < 1 || segments > kMaxSegments) {
     throw std::invalid_argument(

@@ -66,14 +66,13 @@ class SteadyFilter {
 class HeldArm {
  public:
   HeldArm(const BendingPlane& plane, double valve_lag_s, double step_s)
-      : n_(plane.stiffness.size()) {
+      : n_(plane.stiffness.rows()) {
     const bool lag = valve_lag_s > 0.0;
-    MatrixXd stiffness = plane.gravity_slope;
-    stiffness.diagonal() += plane.stiffness;
+    const MatrixXd stiffness = plane.gravity_slope + plane.stiffness;
     MatrixXd rates = MatrixXd::Zero(4 * n_, 4 * n_);
     rates.block(0, n_, n_, n_).setIdentity();
     rates.block(n_, 0, n_, n_) = -plane.inverse_inertia * stiffness;
-    rates.block(n_, n_, n_, n_) = -plane.inverse_inertia * plane.damping.asDiagonal();
+    rates.block(n_, n_, n_, n_) = -plane.inverse_inertia * plane.damping;
     rates.block(n_, (lag ? 2 : 3) * n_, n_, n_) = plane.inverse_inertia;
     if (lag) {
       rates.block(2 * n_, 2 * n_, n_, n_).diagonal().setConstant(-1.0 / valve_lag_s);
@@ -108,16 +107,16 @@ struct Delayed {
 /// Times are instants of the grid.
 class Loop {
  public:
-  Loop(const BendingPlane& plane, const LoopSampling& sampling, const VectorXd& kp,
-       const VectorXd& kd, bool gravity_fed_back)
+  Loop(const BendingPlane& plane, const LoopSampling& sampling, double factor,
+       bool gravity_fed_back)
       : step_s_(sampling.control_period_s / kGrid),
         frame_steps_(std::max(1.0, sampling.frame_period_s / step_s_)),
         latency_(std::llround(sampling.frame_latency_s / step_s_)),
         dead_(std::llround(sampling.dead_time_s / step_s_)),
         arm_(plane, sampling.valve_lag_s, step_s_),
-        filter_(sampling.filter_bandwidth_radps, step_s_, frame_steps_, kp.size()),
-        kd_(kd),
-        value_gain_(-MatrixXd(kp.asDiagonal())) {
+        filter_(sampling.filter_bandwidth_radps, step_s_, frame_steps_, plane.kp.rows()),
+        kd_(factor * plane.kd),
+        value_gain_(-factor * plane.kp) {
     if (gravity_fed_back) value_gain_ += plane.gravity_slope;
   }
 
@@ -167,8 +166,7 @@ class Loop {
       filter_.update(frames_[0].at, frames_[0].value);
     }
     const double act = static_cast<double>(now_) + 0.5 * kGrid;
-    commands_.push_back(
-        {now_ + dead_, value_gain_ * filter_.value(act) - kd_.cwiseProduct(filter_.rate(act))});
+    commands_.push_back({now_ + dead_, value_gain_ * filter_.value(act) - kd_ * filter_.rate(act)});
     tick_ += kGrid;
   }
 
@@ -176,20 +174,35 @@ class Loop {
   std::int64_t latency_, dead_;
   HeldArm arm_;
   SteadyFilter filter_;
-  VectorXd kd_;
-  MatrixXd value_gain_;
+  MatrixXd kd_, value_gain_;
   std::deque<Delayed> frames_, commands_;
   std::int64_t now_ = 0, tick_ = 0, captures_ = 0;
 };
 
 }  // namespace
 
-double loop_growth_1ps(const BendingPlane& plane, const LoopSampling& sampling, const VectorXd& kp,
-                       const VectorXd& kd, bool gravity_fed_back) {
+BendingPlane reduced(const BendingPlane& plane, int modes) {
+  const MatrixXd inertia = plane.inverse_inertia.llt().solve(
+      MatrixXd::Identity(plane.stiffness.rows(), plane.stiffness.cols()));
+  const MatrixXd stiffness = plane.stiffness + plane.gravity_slope;
+  const Eigen::GeneralizedSelfAdjointEigenSolver<MatrixXd> eigen(stiffness, inertia);
+  MatrixXd V(stiffness.rows(), modes);
+  V << eigen.eigenvectors().leftCols(modes / 2), eigen.eigenvectors().rightCols(modes - modes / 2);
+  const auto part = [&](const MatrixXd& matrix) { return MatrixXd(V.transpose() * matrix * V); };
+  return {MatrixXd::Identity(modes, modes),
+          part(plane.gravity_slope),
+          part(plane.stiffness),
+          part(plane.damping),
+          part(plane.kp),
+          part(plane.kd)};
+}
+
+double loop_growth_1ps(const BendingPlane& plane, const LoopSampling& sampling, double factor,
+                       bool gravity_fed_back) {
   // Short windows, so that not even a violent instability overflows in one; many, so that it does
   // not matter which part of an oscillation falls into one: the slope of a line through all.
   constexpr int kSettling = 12, kMeasured = 40;
-  Loop loop(plane, sampling, kp, kd, gravity_fed_back);
+  Loop loop(plane, sampling, factor, gravity_fed_back);
   const double window_s = std::max(0.25, 4.0 * sampling.control_period_s);
   double grown = 0.0, slope = 0.0, weight = 0.0;
   double before = loop.run(window_s);

@@ -15,13 +15,26 @@ constexpr double kHard = 0.05;          ///< of the arm's length a rad: J is dam
 constexpr double kLargestError = 0.25;  ///< of the arm's length
 constexpr double kThetaBound = 0.97;    ///< of max_theta_rad
 constexpr double kLongestStep_s = 0.005;
-constexpr double kLongestPrediction_s = 0.1;  ///< of d: then it rests
+constexpr double kJerkSmoothing_s = 0.01;  ///< measurements let u'' jump
 
 void require_positive(const char* name, double value) {
   if (!std::isfinite(value) || value <= 0.0) {
     throw std::invalid_argument(
         fmt::format("control, task_space.{}: expected a number > 0, got {}", name, value));
   }
+}
+
+void require_not_negative(const char* name, double value) {
+  if (!std::isfinite(value) || value < 0.0) {
+    throw std::invalid_argument(
+        fmt::format("control, task_space.{}: expected a rate >= 0, got {}", name, value));
+  }
+}
+
+double length(const ArmParameters& arm) {
+  double sum_m = 0.0;
+  for (const SegmentParameters& segment : arm.segments) sum_m += segment.length_m;
+  return sum_m;
 }
 
 }  // namespace
@@ -34,16 +47,14 @@ TaskSpaceTracker::TaskSpaceTracker(const ArmParameters& arm, const ControllerSet
       blend_s_(control.blend_s),
       max_theta_rad_(kThetaBound * control.max_theta_rad),
       max_speed_radps_(control.max_speed_radps),
-      reach_m_(0.0) {
+      reach_m_(length(arm)),
+      offset_(gains_.tip_bandwidth_radps, gains_.map_rate_1ps, reach_m_) {
   require_positive("lambda_1ps", gains_.lambda_1ps);
   require_positive("tip_bandwidth_radps", gains_.tip_bandwidth_radps);
-  if (!std::isfinite(gains_.posture_rate_1ps) || gains_.posture_rate_1ps < 0.0) {
-    throw std::invalid_argument(
-        fmt::format("control, task_space.posture_rate_1ps: expected a rate >= 0, got {}",
-                    gains_.posture_rate_1ps));
-  }
-  for (const SegmentParameters& segment : arm_.segments) reach_m_ += segment.length_m;
-  for (SegmentVector* v : {&u_, &velocity_, &acceleration_, &posture_}) v->setZero(arm_.dof());
+  require_not_negative("posture_rate_1ps", gains_.posture_rate_1ps);
+  require_not_negative("map_rate_1ps", gains_.map_rate_1ps);
+  for (SegmentVector* v : {&u_, &velocity_, &acceleration_, &jerk_, &posture_})
+    v->setZero(arm_.dof());
   jacobian_.setZero(3, arm_.dof());
   jacobian_rate_.setZero(3, arm_.dof());
   join_.resize(3);
@@ -52,33 +63,26 @@ TaskSpaceTracker::TaskSpaceTracker(const ArmParameters& arm, const ControllerSet
 
 void TaskSpaceTracker::start(double time_s, ConstVectorRef u, ConstVectorRef velocity,
                              const Eigen::Vector3d& tip_offset_m) noexcept {
-  begin_s_ = time_s_ = offset_time_s_ = time_s;
+  begin_s_ = time_s_ = time_s;
   u_ = u;
   velocity_ = velocity;
-  offset_m_ = tip_offset_m;
-  offset_rate_mps_.setZero();
   limited_ = false;
+  jerk_.setZero();
   const TipReference first = path_.tip(0.0);
   tip_jacobian(arm_, u_, jacobian_);
-  const SegmentVector away = tip_position(arm_, u_) + offset_m_ - first.position_m;
+  const SegmentVector away = tip_position(arm_, u_) + tip_offset_m - first.position_m;
   const SegmentVector rate = jacobian_ * velocity_ - first.velocity_mps;
   join_.set(time_s, std::max(blend_s_, 1e-3), away, rate, -first.acceleration_mps2);
+  offset_.start(time_s, tip_offset_m);
   accelerate();
   bound(kLongestStep_s);
 }
 
-// The line that fits d best with weights exp(-bandwidth age), corrected by one more measurement.
 void TaskSpaceTracker::measure(double time_s, const Eigen::Vector3d& tip_m) noexcept {
-  const double passed = time_s - offset_time_s_;
-  if (!(passed > 0.0)) return;
   const double back = time_s - time_s_;
   posture_ = u_ + back * velocity_ + 0.5 * back * back * acceleration_;
-  const Eigen::Vector3d predicted = offset(time_s);
-  const Eigen::Vector3d news = tip_m - tip_position(arm_, posture_) - predicted;
-  const double memory = std::exp(-gains_.tip_bandwidth_radps * passed);
-  offset_m_ = predicted + (1.0 - memory * memory) * news;
-  offset_rate_mps_ += (1.0 - memory) * (1.0 - memory) / passed * news;
-  offset_time_s_ = time_s;
+  offset_.measure(time_s, tip_m - tip_position(arm_, posture_),
+                  from_base(target(time_s)).position_m);
 }
 
 void TaskSpaceTracker::advance(double time_s) noexcept {
@@ -92,9 +96,9 @@ void TaskSpaceTracker::advance(double time_s) noexcept {
 
 void TaskSpaceTracker::sample(double time_s, ReferenceSample& out) const noexcept {
   const double ahead = time_s - time_s_;
-  out.u = u_ + ahead * velocity_ + 0.5 * ahead * ahead * acceleration_;
-  out.velocity = velocity_ + ahead * acceleration_;
-  out.acceleration = acceleration_;
+  out.acceleration = acceleration_ + ahead * jerk_;
+  out.velocity = velocity_ + ahead * (acceleration_ + 0.5 * ahead * jerk_);
+  out.u = u_ + ahead * (velocity_ + ahead * (0.5 * acceleration_ + ahead / 6.0 * jerk_));
   out.has_polar = false;
   out.limited = limited_;
   out.has_tip = true;
@@ -105,24 +109,26 @@ void TaskSpaceTracker::step(double duration_s) noexcept {
   u_ += duration_s * velocity_ + 0.5 * duration_s * duration_s * acceleration_;
   velocity_ += duration_s * acceleration_;
   time_s_ += duration_s;
+  jerk_ -= acceleration_ / kJerkSmoothing_s;
   accelerate();
   bound(duration_s);
+  jerk_ += acceleration_ / kJerkSmoothing_s;
+  jerk_ *= limited_ ? 0.0 : kJerkSmoothing_s / (kJerkSmoothing_s + duration_s);
 }
 
 // (21) at the present state.
 void TaskSpaceTracker::accelerate() noexcept {
   tip_jacobians(arm_, u_, velocity_, jacobian_, jacobian_rate_);
   const TipReference wanted = target(time_s_);
-  const bool moving = time_s_ - offset_time_s_ < kLongestPrediction_s;
-  Eigen::Vector3d velocity = jacobian_ * velocity_;
-  if (moving) velocity += offset_rate_mps_;
-  Eigen::Vector3d error = wanted.position_m - tip_position(arm_, u_) - offset(time_s_);
+  const TipReference offset = offset_.at(time_s_, from_base(wanted));
+  const Eigen::Vector3d velocity = jacobian_ * velocity_ + offset.velocity_mps;
+  Eigen::Vector3d error = wanted.position_m - tip_position(arm_, u_) - offset.position_m;
   const double largest = kLargestError * reach_m_, size = error.norm();
   limited_ = size > largest;
   if (limited_) error *= largest / size;
 
   const double lambda = gains_.lambda_1ps;
-  const Eigen::Vector3d tip = wanted.acceleration_mps2 +
+  const Eigen::Vector3d tip = wanted.acceleration_mps2 - offset.acceleration_mps2 +
                               2.0 * lambda * (wanted.velocity_mps - velocity) +
                               lambda * lambda * error - jacobian_rate_ * velocity_;
   // J^+ tip + (I - J^+ J) posture, in one go.
@@ -162,10 +168,6 @@ TipReference TaskSpaceTracker::target(double time_s) noexcept {
   blended_.acceleration = out.acceleration_mps2;
   join_.add(time_s, blended_);
   return {blended_.u, blended_.velocity, blended_.acceleration};
-}
-
-Eigen::Vector3d TaskSpaceTracker::offset(double time_s) const noexcept {
-  return offset_m_ + std::min(time_s - offset_time_s_, kLongestPrediction_s) * offset_rate_mps_;
 }
 
 }  // namespace softarm

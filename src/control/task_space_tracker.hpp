@@ -4,20 +4,22 @@
 #include <Eigen/Core>
 
 #include "control/blend.hpp"
+#include "control/tip_offset.hpp"
 #include "softarm/control/reference.hpp"
 #include "softarm/control/settings.hpp"
 #include "softarm/model/arm.hpp"
 
 namespace softarm {
 
-/// Integrates u''_ref = J^+ (p_d'' + 2 L (p_d' - p') + L^2 (p_d - p) - J' u'_ref) + null-space
-/// part, the second line of (21) as corrected, L = lambda, J at the reference state, damped near
-/// singular configurations (`damped_inverse`). u_ref, u'_ref, u''_ref belong together exactly.
+/// Integrates u''_ref = J^+ (p_d'' - d'' + 2 L (p_d' - p') + L^2 (p_d - p) - J' u'_ref) +
+/// null-space part, the second line of (21) as corrected, L = lambda, J at the reference state,
+/// damped near singular configurations (`damped_inverse`). u_ref, u'_ref, u''_ref belong together
+/// exactly.
 ///
-/// p is the measured tip. It comes late and noisy, so what is filtered is only how far it is off
-/// the model's tip of the reference, d = p - f(u_ref), as a line in time; p and p' above are
-/// f(u_ref) + d and J u'_ref + d' now. An arm that follows its reference leaves d alone: the loop
-/// that is closed over the arm is that of d, whatever lambda is.
+/// p is where the tip is bound to be, f(u_ref) + d: the model's tip of the reference plus the offset
+/// of the measured tip, as TipOffset finds it. The integration follows the model alone and is fast;
+/// what is closed over the arm is the loop of d, and that is slow. An arm that follows its reference
+/// leaves d alone, however late it is measured.
 ///
 /// Null space: u'' = -2 L (u' + r u), r the posture rate: the posture drifts to less bend at rate r
 /// and nothing circulates. The same damps directions in which J is nearly singular.
@@ -42,8 +44,9 @@ class TaskSpaceTracker {
   /// Integrates up to `time_s`; at most kMaxSteps steps, longer ones after a long pause.
   void advance(double time_s) noexcept;
 
-  /// u_ref and its derivatives near the time advanced to, u''_ref constant; the vectors of `out`
-  /// must have their size. Sets `tip` and `limited` too.
+  /// u_ref and its derivatives near the time advanced to, with the jerk of the last 10 ms: the
+  /// inverse of the valve lag needs it; without its B u'''_ref it makes the tip's loop unstable. The
+  /// vectors of `out` must have their size. Sets `tip` and `limited` too.
   void sample(double time_s, ReferenceSample& out) const noexcept;
 
   double time_s() const noexcept { return time_s_; }
@@ -55,7 +58,10 @@ class TaskSpaceTracker {
   void step(double duration_s) noexcept;
   void bound(double duration_s) noexcept;
   TipReference target(double time_s) noexcept;
-  Eigen::Vector3d offset(double time_s) const noexcept;
+  TipReference from_base(TipReference path) const noexcept {
+    path.position_m -= arm_.base_position_m;
+    return path;
+  }
 
   ArmParameters arm_;
   TaskSpaceSettings gains_;
@@ -63,11 +69,10 @@ class TaskSpaceTracker {
   double blend_s_, max_theta_rad_, max_speed_radps_, reach_m_;
 
   double begin_s_ = 0.0, time_s_ = 0.0;
-  SegmentVector u_, velocity_, acceleration_;
+  SegmentVector u_, velocity_, acceleration_, jerk_;
   bool limited_ = false;
   Blend join_;
-  double offset_time_s_ = 0.0;
-  Eigen::Vector3d offset_m_ = Eigen::Vector3d::Zero(), offset_rate_mps_ = Eigen::Vector3d::Zero();
+  TipOffset offset_;
   Eigen::Matrix3Xd jacobian_, jacobian_rate_;
   SegmentVector posture_;
   ReferenceSample blended_;

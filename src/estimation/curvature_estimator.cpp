@@ -28,9 +28,6 @@ double twice_angle_over(double h, double v) {
   return 2.0 * std::atan2(h, v) / h;
 }
 
-/// c1(theta^2 / 4) = sin(theta / 2) / (theta / 2): chord over length of a PCC segment.
-double c1_of_half(const Eigen::Vector2d& u) { return entire_functions(0.25 * u.squaredNorm())[1]; }
-
 /// The relative transform (19) and what it measures.
 struct RelativePose {
   Eigen::Quaterniond q;
@@ -106,6 +103,20 @@ bool curvature_of(const Eigen::Vector3d& v, Eigen::Vector2d& u) {
   return u.allFinite();
 }
 
+/// The chord over the length of a PCC segment, c1(theta^2 / 4) = sin(x) / x with x = theta / 2, and
+/// the length by the chord. The radial and transverse parts of the positions' noise are independent:
+/// one moves |t|, the other theta, of which l depends by kappa = theta (c2 - c3) / (4 c1) = (1 - x
+/// cot x) / theta.
+void measure_length(double position_variance, SegmentCurvature& out) {
+  const auto c = entire_functions(0.25 * out.u_rad.squaredNorm());
+  out.chord_over_length = c[1];
+  if (!(out.chord_m > 0.0) || !(c[1] > 0.0)) return;
+  const double slope = out.chord_m * out.u_rad.norm() * (c[2] - c[3]) / (4.0 * c[1] * c[1]);
+  out.length_m = out.chord_m / c[1];
+  out.length_variance_m2 = position_variance / (c[1] * c[1]) + slope * slope * out.variance_rad2;
+  out.length_covariance_m_rad = slope * out.variance_rad2;
+}
+
 /// (20) as printed. Where arcsin has no value (its argument above 1 from a quaternion's rounding)
 /// it takes pi / 2.
 bool printed_curvature(const RelativePose& relative, double orientation_variance,
@@ -144,6 +155,8 @@ void CurvatureEstimate::leave_out(int index) noexcept {
   valid[k] = false;
   u_rad.segment<2>(2 * index).setZero();
   variance_rad2[k] = twist_rad[k] = torsion_rad[k] = length_error_m[k] = 0.0;
+  length_m[k] = length_covariance_m_rad[k] = 0.0;
+  length_variance_m2[k] = std::numeric_limits<double>::infinity();
 }
 
 CurvatureEstimator::CurvatureEstimator(const EstimationSettings& settings, const ArmParameters& arm,
@@ -203,6 +216,7 @@ SegmentCurvature CurvatureEstimator::segment(int index, const BodyPose& upper,
       out.valid = curvature_of(v, out.u_rad);
   }
   if (!out.valid) out.u_rad.setZero();
+  if (out.valid) measure_length(constants.position_variance, out);
   out.twist_rad = 2.0 * std::atan2(relative.axis.z(), bend_norm);
   // Towards theta = 2 pi the chord vanishes, and with it its direction.
   out.torsion_rad = relative.chord > kLeastChord * constants.length_m
@@ -227,7 +241,10 @@ void CurvatureEstimator::estimate(const MocapFrame& frame, CurvatureEstimate& ou
     out.twist_rad[k] = one.valid ? one.twist_rad : 0.0;
     out.torsion_rad[k] = one.valid ? one.torsion_rad : 0.0;
     out.length_error_m[k] =
-        one.valid ? one.chord_m - segments_[k].length_m * c1_of_half(one.u_rad) : 0.0;
+        one.valid ? one.chord_m - segments_[k].length_m * one.chord_over_length : 0.0;
+    out.length_m[k] = one.length_m;
+    out.length_variance_m2[k] = one.length_variance_m2;
+    out.length_covariance_m_rad[k] = one.length_covariance_m_rad;
   }
 }
 

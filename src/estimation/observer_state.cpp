@@ -67,6 +67,7 @@ ModelObserver::State::State(const ArmParameters& arm_, const EstimationSettings&
       monitor(torque_scale(arm), settings.disturbance_drift_per_sqrt_s,
               settings.largest_disturbance_drift_per_sqrt_s),
       scale_nm(torque_scale(arm)) {
+  expect_constant_length(arm, "observer");
   require(settings.parameter_deviation >= 0.0, "parameter_deviation >= 0",
           settings.parameter_deviation);
   require(settings.disturbance_drift_per_sqrt_s > 0.0, "disturbance_drift_per_sqrt_s > 0",

@@ -34,10 +34,7 @@ const ArmParameters& checked(const ArmParameters& arm) {
   if (arm.size() < 1) {
     throw std::invalid_argument("AugmentedRobot: expected at least one segment, got 0");
   }
-  if (arm.extensible) {
-    throw std::invalid_argument(
-        "AugmentedRobot: expected segments of constant length, got an arm that stretches");
-  }
+  expect_constant_length(arm, "AugmentedRobot");
   if (arm.mass != MassModel::point) {
     throw std::invalid_argument(
         "AugmentedRobot: expected point masses, got distributed mass (Table I has one point mass a "

@@ -65,6 +65,18 @@ void substitute(const Eigen::Ref<const Eigen::MatrixXd>& L,
 
 }  // namespace
 
+void hold_constant_lengths(const ArmParameters& arm, Eigen::Ref<Eigen::MatrixXd> B,
+                           VectorRef force) noexcept {
+  for (int i = 0; i < arm.size(); ++i) {
+    if (!arm.segments[static_cast<std::size_t>(i)].constant_length) continue;
+    const int e = 3 * i + 2;
+    B.row(e).setZero();
+    B.col(e).setZero();
+    B(e, e) = 1.0;
+    force(e) = 0.0;
+  }
+}
+
 bool solve_inertia(DynamicsWorkspace& workspace, const Eigen::Ref<const Eigen::MatrixXd>& B,
                    ConstVectorRef rhs, VectorRef x) noexcept {
   auto& s = workspace.storage();
@@ -103,6 +115,7 @@ bool forward_dynamics(const ArmParameters& arm, DynamicsWorkspace& workspace, Co
                    {.inertia = false, .coriolis = true, .gravity = true}, s.bias);
   add_impedance(arm, u, velocity, s.bias);
   s.bias = generalized_force - s.bias;
+  if (arm.extensible) hold_constant_lengths(arm, s.B, s.bias);
   return solve_inertia(workspace, s.B, s.bias, acceleration);
 }
 

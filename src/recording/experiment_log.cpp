@@ -2,28 +2,54 @@
 
 #include <fmt/format.h>
 
-#include <fstream>
 #include <iterator>
 #include <nlohmann/json.hpp>
-#include <stdexcept>
 
 #include "softarm/base/version.hpp"
 
 namespace softarm {
+namespace {
+
+/// Makes the folder if it can; who opens a file in it reports why not.
+const std::filesystem::path& made(const std::filesystem::path& folder) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  return folder;
+}
+
+}  // namespace
 
 std::string provenance_line(const Experiment& experiment) {
   return fmt::format("# softarm {} commit {} configuration {:016x} seed {} name {}", version_text(),
                      commit_text(), experiment.hash, experiment.seed, experiment.name);
 }
 
-ExperimentLog::ExperimentLog(const std::filesystem::path& folder, const Experiment& experiment)
-    : path_(folder / "log.csv"), segments_(experiment.arm.size()) {
-  std::error_code error;
-  std::filesystem::create_directories(folder, error);
-  file_.reset(std::fopen(path_.c_str(), "w"));
-  if (!file_)
-    throw std::runtime_error(fmt::format("cannot write {}: choose another --out", path_.string()));
+Files inputs_of(const Experiment& experiment, const Files& more) {
+  Files all = experiment.files;
+  all.insert(all.end(), more.begin(), more.end());
+  return all;
+}
 
+SummaryFiles::SummaryFiles(const std::filesystem::path& folder, const Experiment& experiment,
+                           const Files& inputs)
+    : summary_(made(folder) / "summary.json", inputs_of(experiment, inputs)),
+      timing_(folder / "timing.json", inputs_of(experiment, inputs)) {
+  constexpr std::size_t kReserved = 64 * 1024;
+  summary_.reserve(kReserved);
+  timing_.reserve(kReserved);
+}
+
+void SummaryFiles::write(const std::string& summary, const std::string& timing) {
+  summary_.write(summary);
+  summary_.commit();
+  timing_.write(timing);
+  timing_.commit();
+}
+
+ExperimentLog::ExperimentLog(const std::filesystem::path& folder, const Experiment& experiment,
+                             const Files& inputs)
+    : file_(made(folder) / "log.csv", inputs_of(experiment, inputs), OutputFile::Kind::record),
+      segments_(experiment.arm.size()) {
   std::string header = provenance_line(experiment) + "\nt_s,mode,reason,saturated,frame_age_s";
   for (int i = 1; i <= segments_; ++i)
     header += fmt::format(
@@ -36,7 +62,7 @@ ExperimentLog::ExperimentLog(const std::filesystem::path& folder, const Experime
     for (std::size_t j = 0; j < experiment.actuation.segments[i].size(); ++j, ++chambers_)
       header += fmt::format(",p{0}_{1}_bar,pm{0}_{1}_bar", i + 1, j + 1);
   header += ",tip_x_m,tip_y_m,tip_z_m,tipref_x_m,tipref_y_m,tipref_z_m\n";
-  std::fputs(header.c_str(), file_.get());
+  file_.write(header);
 }
 
 void ExperimentLog::cell(double value) {
@@ -74,15 +100,7 @@ void ExperimentLog::add(const LogRow& row) {
   cells(row.tip ? row.tip->data() : nullptr, row.tip ? 3 : 0, 3);
   cells(row.tip_reference ? row.tip_reference->data() : nullptr, row.tip_reference ? 3 : 0, 3);
   line_ += '\n';
-  std::fputs(line_.c_str(), file_.get());
-}
-
-void ExperimentLog::close() {
-  const bool written = std::fflush(file_.get()) == 0 && std::ferror(file_.get()) == 0;
-  file_.reset();
-  if (!written)
-    throw std::runtime_error(
-        fmt::format("could not write all of {}: is the disk full?", path_.string()));
+  file_.write(line_);
 }
 
 std::string timing_json(const TimingReport& report) {
@@ -99,13 +117,6 @@ std::string timing_json(const TimingReport& report) {
   }
   json["histograms"] = std::move(histograms);
   return json.dump() + "\n";
-}
-
-void write_text(const std::filesystem::path& path, const std::string& text) {
-  std::ofstream file(path);
-  file << text << std::flush;
-  if (!file)
-    throw std::runtime_error(fmt::format("cannot write {}: is the disk full?", path.string()));
 }
 
 }  // namespace softarm

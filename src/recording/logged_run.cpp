@@ -14,6 +14,7 @@ namespace softarm {
 LoggedRun::LoggedRun(const Experiment& experiment, const std::filesystem::path& log)
     : experiment_(experiment),
       pipeline_(experiment),
+      timeline_(experiment.transport),
       mocap_(experiment.transport, experiment.safety, experiment.arm),
       log_(log) {
   if (!read_frame())
@@ -25,15 +26,14 @@ LoggedRun::LoggedRun(const Experiment& experiment, const std::filesystem::path& 
 
 bool LoggedRun::read_frame() {
   for (LogEvent event; log_.next(event);) {
+    const auto arrival_ns = timeline_.arrival_ns(event);
     const auto channel = mocap_.find(event.channel);
     if (!channel) continue;
-    const auto arrival_ns = event.arrival_ns();
     if (!arrival_ns) {
       ++malformed_;
       continue;
     }
-    // The times of a log from several sources may step back a little; our time does not.
-    next_arrival_ns_ = std::max(next_arrival_ns_, *arrival_ns);
+    next_arrival_ns_ = *arrival_ns;
     const MocapReceipt receipt = mocap_.take(*channel, event.data, next_arrival_ns_, next_);
     if (receipt == MocapReceipt::malformed) ++malformed_;
     if (receipt == MocapReceipt::frame) return has_next_ = true;

@@ -57,15 +57,19 @@ bool same_poses(const CsvTable& table, const RecordingMap& map, std::size_t a, s
 class Importer {
  public:
   explicit Importer(const MappedTable& recording)
-      : map_(recording.map),
+      : files_(recording.files),
+        map_(recording.map),
         table_(recording.table),
         convention_(map_.bodies.size(), convention(Eigen::Isometry3d::Identity())) {
+    drop_equal_times();
     check_times();
+    check_pressures(map_.commanded);
+    check_pressures(map_.measured);
     if (map_.rest) learn_rest();
   }
 
   ImportSummary write(const std::filesystem::path& out) {
-    EventLogWriter log(out);
+    EventLogWriter log(out, files_, OutputFile::Kind::document);
     for (std::size_t row = 0; row < table_.rows(); ++row) {
       if (!map_.measured.empty()) append(log, map_.measurement_channel, row, measurement(row));
       if (!map_.commanded.empty()) append(log, map_.command_channel, row, command(row));
@@ -82,6 +86,41 @@ class Importer {
     return map_.time_unit_s * table_.at(row, map_.time_column);
   }
   std::int64_t time_us(std::size_t row) const { return std::llround(1e6 * time_s(row)); }
+
+  /// Where the map says which of several rows with one time counts, the others go.
+  void drop_equal_times() {
+    if (map_.equal_times == EqualTimes::refuse) return;
+    const std::size_t width = table_.columns.size();
+    std::size_t kept = 0;
+    for (std::size_t row = 0; row < table_.rows(); ++row) {
+      const bool equal =
+          kept > 0 && table_.at(row, map_.time_column) == table_.at(kept - 1, map_.time_column);
+      if (equal && map_.equal_times == EqualTimes::first) continue;
+      if (!equal) ++kept;
+      std::copy_n(table_.cells.begin() + static_cast<std::ptrdiff_t>(row * width), width,
+                  table_.cells.begin() + static_cast<std::ptrdiff_t>((kept - 1) * width));
+      table_.lines[kept - 1] = table_.lines[row];
+    }
+    table_.lines.resize(kept);
+    table_.cells.resize(kept * width);
+  }
+
+  /// A pressure that is no number would be commanded as none.
+  void check_pressures(const std::vector<std::size_t>& columns) {
+    for (const std::size_t column : columns)
+      for (std::size_t row = 0; row < table_.rows(); ++row) {
+        double& value = table_.cells[row * table_.columns.size() + column];
+        if (std::isfinite(value)) continue;
+        if (row > 0 && map_.missing_pressure == MissingPressure::hold) {
+          value = table_.at(row - 1, column);
+          continue;
+        }
+        throw std::runtime_error(
+            fmt::format("{}:{}: {}: expected a finite pressure, got {}{}", table_.file,
+                        table_.lines[row], table_.columns[column], value,
+                        row > 0 ? "; pressures.missing: hold takes that of the row before" : ""));
+      }
+  }
 
   void check_times() const {
     for (std::size_t row = 0; row < table_.rows(); ++row) {
@@ -241,8 +280,9 @@ class Importer {
     log.write(time_us(row), channel, bytes_);
   }
 
+  const Files& files_;
   const RecordingMap& map_;
-  const CsvTable& table_;
+  CsvTable table_;                          ///< a copy: rows may go, pressures may be held
   std::vector<PoseConvention> convention_;  // of every body, to the segment frame it carries
   ImportSummary summary_;
   softarm_messages::mocap_frame_t frame_{};

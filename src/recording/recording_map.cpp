@@ -1,9 +1,10 @@
 #include "softarm/recording/recording_map.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
-#include <sstream>
+#include <charconv>
 
 #include "softarm/config/config_keys.hpp"
 #include "softarm/model/arm.hpp"
@@ -15,17 +16,18 @@ namespace {
 constexpr auto kRequired = Presence::required;
 /// The form of column names. A function, because a map may be read before the variables of this
 /// file are initialised.
-Form names() { return from(1, 2000); }
+Form names() { return from(1, 1e5); }
 
 /// The map as it is written in YAML: column names where RecordingMap has indices.
 struct NamedBody {
   int id = 0;
+  std::string body;
   std::string position, orientation;
   double length_m = 0.0;
 };
 struct NamedMap {
-  std::string separator = ",";
-  std::string time = "time";
+  std::string separator;
+  std::string time;
   NamedBody base;
   std::vector<NamedBody> segments;
   std::string commanded, measured;
@@ -35,14 +37,17 @@ struct NamedMap {
 
 void describe_body(Keys& key, NamedBody& it) {
   key("id", it.id, from(0, 1e6), "of the body in our messages", kRequired);
-  key("position", it.position, names(), "names of the three columns x y z", kRequired);
-  key("orientation", it.orientation, names(), "names of the four columns, in quaternion_order",
-      kRequired);
+  key("body", it.body, names(), "its name in the table, instead of position and orientation");
+  key("position", it.position, names(), "names of the three columns x y z");
+  key("orientation", it.orientation, names(), "names of the four columns, in quaternion_order");
 }
 
 void describe_table(Keys& key, NamedMap& it, RecordingMap& map) {
-  key("separator", it.separator, from(1, 1), "between the cells");
-  key("time", it.time, names(), "name of the time column");
+  key("separator", it.separator, from(1, 1), "between the cells; left out: the one that is there");
+  key("time", it.time, names(),
+      "name of the time column; left out: time, or that of a motion-capture export");
+  key("equal_times", map.equal_times, one_of({"refuse", "first", "last"}),
+      "rows with the time of the row before: refuse, or use the first or the last of them");
   key("time_unit_s", map.time_unit_s, above(0, 1e4), "one unit of time");
   key("position_unit_m", map.position_unit_m, above(0, 1e4), "one unit of position");
   key("up", map.up, one_of({"x", "y", "z"}), "axis of the world that points up");
@@ -59,6 +64,8 @@ void describe_rest(Keys& key, NamedMap& it, RecordingMap& map) {
 
 void describe_pressures(Keys& key, NamedMap& it, RecordingMap& map) {
   key("unit_bar", map.pressure_unit_bar, above(0, 1e4), "one unit of pressure");
+  key("missing", map.missing_pressure, one_of({"refuse", "hold"}),
+      "a pressure that is no finite number: refuse, or hold that of the row before");
   key("commanded", it.commanded, names(), "names of columns");
   key("measured", it.measured, names(), "names of columns");
 }
@@ -94,8 +101,7 @@ class ColumnFinder {
   std::vector<std::size_t> find(const std::string& key, const std::string& names,
                                 std::size_t count) const {
     std::vector<std::size_t> columns;
-    std::istringstream stream(names);
-    for (std::string name; stream >> name;) columns.push_back(one(key, name));
+    for (const std::string& name : split(names)) columns.push_back(one(key, name));
     if (count != 0 && columns.size() != count) {
       throw reader_.error_at(key, fmt::format("{} names of columns", count),
                              fmt::format("{}", columns.size()));
@@ -105,16 +111,35 @@ class ColumnFinder {
 
   std::size_t one(const std::string& key, const std::string& name) const {
     const auto at = std::find(table_.columns.begin(), table_.columns.end(), name);
-    if (at == table_.columns.end()) {
-      throw reader_.error_at(key, fmt::format("a column of {}", table_.file), name);
-    }
-    return static_cast<std::size_t>(at - table_.columns.begin());
+    if (at != table_.columns.end()) return static_cast<std::size_t>(at - table_.columns.begin());
+    std::size_t number = 0;
+    const char* const end = name.data() + name.size();
+    if (name.starts_with('#') && std::from_chars(name.data() + 1, end, number).ptr == end &&
+        number >= 1 && number <= table_.columns.size())
+      return number - 1;
+    throw reader_.error_at(key, fmt::format("a column of {} ({})", table_.file, some_columns()),
+                           name);
+  }
+
+  std::size_t time(const std::string& name) const {
+    if (name.empty() && table_.time_column) return *table_.time_column;
+    return one("time", name.empty() ? "time" : name);
   }
 
   BodyColumns body(const std::string& key, const NamedBody& named, QuaternionOrder order) const {
     BodyColumns body;
     body.id = named.id;
     body.length_m = named.length_m;
+    if (!named.body.empty()) {
+      const auto at = std::find_if(table_.bodies.begin(), table_.bodies.end(),
+                                   [&](const TableBody& it) { return it.name == named.body; });
+      if (at == table_.bodies.end())
+        throw reader_.error_at(key + ".body",
+                               fmt::format("a body of {} ({})", table_.file, bodies()), named.body);
+      body.position = at->position;
+      body.orientation = at->orientation;
+      return body;
+    }
     const auto position = find(key + ".position", named.position, 3);
     auto orientation = find(key + ".orientation", named.orientation, 4);
     if (order == QuaternionOrder::wxyz) {
@@ -126,6 +151,33 @@ class ColumnFinder {
   }
 
  private:
+  /// Names between blanks; in quotes they may hold some.
+  static std::vector<std::string> split(const std::string& text) {
+    std::vector<std::string> names;
+    for (std::size_t at = text.find_first_not_of(' '); at < text.size();
+         at = text.find_first_not_of(' ', at)) {
+      const bool quoted = text[at] == '\'' || text[at] == '"';
+      const std::size_t begin = at + (quoted ? 1 : 0);
+      const std::size_t end = std::min(text.find(quoted ? text[at] : ' ', begin), text.size());
+      names.push_back(text.substr(begin, end - begin));
+      at = end + (quoted ? 1 : 0);
+    }
+    return names;
+  }
+  std::string some_columns() const {
+    constexpr std::size_t kSome = 12;
+    const std::size_t count = std::min(table_.columns.size(), kSome);
+    return fmt::format("{}{}",
+                       fmt::join(table_.columns.begin(),
+                                 table_.columns.begin() + static_cast<std::ptrdiff_t>(count), ", "),
+                       count < table_.columns.size() ? ", ..." : "");
+  }
+  std::string bodies() const {
+    std::vector<std::string> names;
+    for (const TableBody& each : table_.bodies) names.push_back(each.name);
+    return names.empty() ? "it names none" : fmt::format("{}", fmt::join(names, ", "));
+  }
+
   const ConfigKeys& reader_;
   const CsvTable& table_;
 };
@@ -135,6 +187,15 @@ void check(const ConfigKeys& reader, const NamedMap& named, RecordingMap& map) {
     throw reader.error_at("segments", fmt::format("at most {}", kMaxSegments),
                           fmt::format("{}", named.segments.size()));
   }
+  const auto whole = [&](const NamedBody& body, const std::string& key) {
+    const bool columns = !body.position.empty() && !body.orientation.empty();
+    if (body.body.empty() ? columns : body.position.empty() && body.orientation.empty()) return;
+    throw reader.error_at(key, "either body, or position and orientation",
+                          body.body.empty() ? "one of them, or none" : "both");
+  };
+  whole(named.base, "base");
+  for (std::size_t i = 0; i < named.segments.size(); ++i)
+    whole(named.segments[i], fmt::format("segments[{}]", i));
   std::vector<int> ids{named.base.id};
   for (std::size_t i = 0; i < named.segments.size(); ++i) {
     const int id = named.segments[i].id;
@@ -175,9 +236,14 @@ MappedTable read_mapped_table(const std::filesystem::path& table,
   keys.visit([&] { describe_map(keys, named, out.map); });
   check(keys, named, out.map);
 
-  out.table = read_csv(table, named.separator.front());
+  out.files = keys.files();
+  out.files.push_back(table);
+  out.table = read_csv(
+      table, named.separator.empty() ? std::nullopt : std::optional(named.separator.front()));
   const ColumnFinder finder(keys, out.table);
-  out.map.time_column = finder.one("time", named.time);
+  out.map.time_column = finder.time(named.time);
+  if (!keys.given("position_unit_m") && out.table.position_unit_m > 0.0)
+    out.map.position_unit_m = out.table.position_unit_m;
   out.map.bodies.push_back(finder.body("base", named.base, named.order));
   for (std::size_t i = 0; i < named.segments.size(); ++i) {
     out.map.bodies.push_back(

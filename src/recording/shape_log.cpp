@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <iterator>
-#include <stdexcept>
 
 #include "softarm/recording/experiment_log.hpp"
 
@@ -14,22 +13,25 @@ constexpr double kPeriod_s = 0.02;
 
 }  // namespace
 
-ShapeLog::ShapeLog(const std::filesystem::path& folder, const Experiment& experiment)
-    : path_(folder / "shape.csv"), origin_(provenance_line(experiment)), plant_(experiment.plant) {
+ShapeLog::ShapeLog(const std::filesystem::path& folder, const Experiment& experiment,
+                   const Files& inputs)
+    : path_(folder / "shape.csv"),
+      origin_(provenance_line(experiment)),
+      plant_(experiment.plant),
+      inputs_(inputs_of(experiment, inputs)) {
+  refuse_input(path_, inputs_);
   std::error_code error;
   std::filesystem::remove(path_, error);
 }
 
 void ShapeLog::open(Eigen::Index parts, std::size_t points) {
-  file_.reset(std::fopen(path_.c_str(), "w"));
-  if (!file_)
-    throw std::runtime_error(fmt::format("cannot write {}: choose another --out", path_.string()));
+  file_.emplace(path_, inputs_, OutputFile::Kind::record);
   std::string header = origin_ + "\nt_s";
   for (Eigen::Index j = 1; j <= parts; ++j)
     header += fmt::format(",bend{0}_x_rad,bend{0}_y_rad", j);
   for (std::size_t j = 0; j < points; ++j)
     header += fmt::format(",point{0}_x_m,point{0}_y_m,point{0}_z_m", j);
-  std::fputs((header + "\n").c_str(), file_.get());
+  file_->write(header + "\n");
 }
 
 void ShapeLog::add(const LogRow& row) {
@@ -44,8 +46,12 @@ void ShapeLog::add(const LogRow& row) {
   for (const Eigen::Vector3d& point : shape.points_m)
     for (const double value : point) fmt::format_to(out, ",{:.7g}", value);
   line_ += '\n';
-  std::fputs(line_.c_str(), file_.get());
+  file_->write(line_);
   next_s_ = row.t_s + kPeriod_s - 1e-9;
+}
+
+void ShapeLog::close() {
+  if (file_) file_->commit();
 }
 
 }  // namespace softarm

@@ -38,12 +38,22 @@ void TruthTrack::fill(std::int64_t time_us, LogRow& row) const {
   row.tip = (1 - s) * before_->tip_m + s * after_->tip_m;
 }
 
-StatusRecord::StatusRecord(const Experiment& experiment, const std::filesystem::path& folder)
-    : experiment_(experiment),
-      folder_(folder),
-      summary_(experiment.arm.size(), experiment.run.tracking_from_s) {
+StatusRecord::StatusRecord(const Experiment& experiment, const std::filesystem::path& folder,
+                           const Files& inputs)
+    : experiment_(experiment), summary_(experiment.arm.size(), experiment.run.tracking_from_s) {
   if (experiment.actuation.kind == ActuationKind::torque) summary_.commands_are_torques();
-  if (!folder.empty()) log_.emplace(folder, experiment);
+  if (folder.empty()) return;
+  log_.emplace(folder, experiment, inputs);
+  files_.emplace(folder, experiment, inputs);
+}
+
+template <class Write>
+void StatusRecord::try_to(const Write& write) {
+  try {
+    write();
+  } catch (const OutputError& error) {
+    if (failure_.empty()) failure_ = error.what();
+  }
 }
 
 bool StatusRecord::take(std::string_view channel, std::span<const std::byte> bytes) {
@@ -105,7 +115,7 @@ void StatusRecord::write_rows(bool all) {
     const bool patient = waited_us >= 0 && waited_us < kTruthPatience_us;
     if (!all && patient && !truth_.reaches(next.time_us)) return;
     truth_.fill(next.time_us, next.row);
-    if (log_) log_->add(next.row);
+    if (log_ && failure_.empty()) try_to([&] { log_->add(next.row); });
     summary_.add(next.row, 1.0 / experiment_.rate_hz);
     waiting_.pop_front();
   }
@@ -114,9 +124,8 @@ void StatusRecord::write_rows(bool all) {
 void StatusRecord::close() {
   write_rows(true);
   if (!log_) return;
-  log_->close();
-  write_text(folder_ / "summary.json", summary_.json());
-  write_text(folder_ / "timing.json", timing_text());
+  try_to([&] { log_->close(); });
+  try_to([&] { files_->write(summary_.json(), timing_text()); });
 }
 
 std::string StatusRecord::table() const {

@@ -47,6 +47,8 @@ ControlPipeline::ControlPipeline(const PipelineSettings& settings)
       command_moves_(settings.actuation),
       frame_period_watch_(settings.safety),
       curvature_watch_(settings.safety, settings.arm),
+      oscillation_watch_(settings.safety, period_s_, settings.arm.dof()),
+      length_watch_(settings.safety, settings.arm),
       previous_bar_(PressureVector::Zero(allocator_.chambers())),
       previous_tau_nm_(SegmentVector::Zero(settings.arm.dof())),
       commanded_tau_nm_(previous_tau_nm_),
@@ -59,7 +61,7 @@ ControlPipeline::~ControlPipeline() = default;
 
 const TickOutput& ControlPipeline::tick(const TickInput& input) noexcept {
   if (!ticked_) epoch_ns_ = input.now_ns;
-  if (input.command_expired) forget_command();
+  if (input.command_expired || input.paused) forget_command();
   SafetyInput safety;
   validate_and_estimate(input, safety);
 
@@ -68,6 +70,7 @@ const TickOutput& ControlPipeline::tick(const TickInput& input) noexcept {
   predict(input.now_ns, act_ns);
   safety.motion_unknown = !output_.motion.all_valid();
   safety.command_expired = input.command_expired && ticked_;
+  safety.paused = input.paused && ticked_;
   watch(input, safety);
 
   const Mode before = safety_.mode();
@@ -86,6 +89,9 @@ const TickOutput& ControlPipeline::tick(const TickInput& input) noexcept {
   if (mode == Mode::active) {
     reference_.advance(seconds(act_ns));
     control(act_ns);
+    oscillation_watch_.judge(window_.now.u, output_.motion.u_rad);
+  } else {
+    oscillation_watch_.reset();
   }
   limit(mode);
   if (observer_) {
@@ -118,7 +124,8 @@ void ControlPipeline::forget_command() noexcept {
 void ControlPipeline::validate_and_estimate(const TickInput& input, SafetyInput& safety) noexcept {
   // After a stop of this process anything may have happened: what is queued is history, not
   // measurement.
-  const bool gap = ticked_ && input.now_ns - previous_ns_ > safety_.thresholds().vent_after_ns;
+  const bool gap =
+      ticked_ && (input.paused || input.now_ns - previous_ns_ > safety_.thresholds().vent_after_ns);
   if (gap) {
     validator_.reset();
     filter_.reset();
@@ -126,6 +133,7 @@ void ControlPipeline::validate_and_estimate(const TickInput& input, SafetyInput&
     pressure_watch_.reset();
     curvature_watch_.reset();
     frame_period_watch_.restart();
+    length_watch_.reset();
   }
   const CommandedMotion commanded{command_moves_.began_ns(), settings_.safety.frozen_frames};
   const std::int64_t max_latency_ns = to_ns(settings_.safety.max_latency_s);
@@ -170,6 +178,7 @@ void ControlPipeline::validate_and_estimate(const TickInput& input, SafetyInput&
   safety.newest_measurement_ns = input.newest_measurement_ns;
   safety.deadman_used = settings_.safety.deadman;
   safety.newest_go_ns = input.newest_go_ns;
+  safety.newest_foreign_ns = input.newest_foreign_ns;
   safety.requests = input.requests;
   output_.soft_limit = safety.soft_limit_exceeded;
   output_.frame_age_s = newest_capture_ns_ == kNever
@@ -180,7 +189,12 @@ void ControlPipeline::validate_and_estimate(const TickInput& input, SafetyInput&
 void ControlPipeline::watch(const TickInput& input, SafetyInput& safety) noexcept {
   if (input.measured_bar != nullptr && input.measured_bar->size() == previous_bar_.size())
     pressure_watch_.measure(*input.measured_bar);
+  safety.oscillation = oscillation_watch_.oscillates();
   safety.pressure_mismatch = settings_.safety.valve_readback && pressure_watch_.out_of_tolerance();
+  // An arm that is not pressurised yet can wait for a second look.
+  const bool waiting = safety_.mode() == Mode::wait_frames;
+  safety.length_mismatch = length_watch_.out_of_tolerance() || (waiting && length_watch_.beyond());
+  output_.length_warning = length_watch_.warns();
   if (!curvature_watch_.used()) return;
   // What is judged is the balance of an arm that is observed and commanded.
   const bool under_control = safety_.mode() == Mode::active || safety_.mode() == Mode::hold;
@@ -206,6 +220,7 @@ void ControlPipeline::use_frame() noexcept {
     unanswered_since_ns_ = kForever;
   }
   newest_capture_ns_ = frame.capture_ns;
+  length_watch_.judge(frame.capture_ns, estimate);
   output_.frame_number = frame.frame_number;
   const BodyPose& tip = frame.body[static_cast<std::size_t>(settings_.arm.size())];
   if (tip.valid) reference_.measure_tip(seconds(frame.capture_ns), tip.position_m);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "softarm/base/time.hpp"
 #include "softarm/model/actuation_matrix.hpp"
@@ -151,6 +152,107 @@ double CurvatureWatch::largest_residual_nm(ConstVectorRef u_rad,
   for (Eigen::Index i = 0; i < force_.size(); i += 2)
     largest = std::max(largest, (force_.segment<2>(i) - actuated_.segment<2>(i)).norm());
   return largest;
+}
+
+OscillationWatch::OscillationWatch(const SafetySettings& settings, double period_s, int dof)
+    : amplitude_rad_(settings.oscillation_rad),
+      part_(settings.oscillation_part),
+      share_(1.0 - std::exp(-2.0 * std::numbers::pi * settings.oscillation_lowest_hz * period_s)),
+      longest_ticks_(static_cast<int>(
+          std::min(std::ceil(0.5 / (settings.oscillation_lowest_hz * period_s)), 1e9))),
+      half_periods_(2 * settings.oscillation_periods),
+      coordinates_(static_cast<std::size_t>(dof)) {}
+
+void OscillationWatch::reset() noexcept {
+  std::fill(coordinates_.begin(), coordinates_.end(), Coordinate{});
+  oscillates_ = false;
+}
+
+void OscillationWatch::judge(ConstVectorRef reference_rad, ConstVectorRef u_rad) noexcept {
+  if (!(amplitude_rad_ > 0.0)) return;
+  for (Eigen::Index i = 0; i < u_rad.size(); ++i) {
+    Coordinate& it = coordinates_[static_cast<std::size_t>(i)];
+    judge(it, it.error.pass(reference_rad[i] - u_rad[i], share_),
+          std::abs(it.reference.pass(reference_rad[i], share_)));
+  }
+}
+
+void OscillationWatch::judge(Coordinate& it, double error_rad, double reference_rad) noexcept {
+  // Half the amplitude on the other side is a change of sign: noise is none.
+  const bool turned = error_rad * it.extremum < 0.0 && std::abs(error_rad) > 0.5 * amplitude_rad_;
+  if (turned) end_half_period(it);
+  if (turned || std::abs(error_rad) > std::abs(it.extremum)) it.extremum = error_rad;
+  it.reference_extremum = std::max(it.reference_extremum, reference_rad);
+  it.ticks = std::min(it.ticks + 1, longest_ticks_ + 1);
+  if (it.ticks > longest_ticks_) it.half_periods = 0;
+}
+
+void OscillationWatch::end_half_period(Coordinate& it) noexcept {
+  constexpr double kFades = 0.7;
+  const double size = std::abs(it.extremum);
+  const double reference = std::max(it.reference_extremum, it.last_reference_extremum);
+  const bool counts =
+      size >= amplitude_rad_ && size >= part_ * reference && it.ticks <= longest_ticks_;
+  if (!counts) {
+    it.half_periods = 0;
+  } else if (it.half_periods == 0 || size < kFades * it.first_extremum) {
+    it.half_periods = 1;
+    it.first_extremum = size;
+  } else {
+    ++it.half_periods;
+  }
+  oscillates_ |= it.half_periods >= half_periods_;
+  it.last_reference_extremum = it.reference_extremum;
+  it.reference_extremum = 0.0;
+  it.ticks = 0;
+}
+
+// What remains after the slow part, twice.
+double OscillationWatch::HighPass::pass(double value, double share) noexcept {
+  if (!started_) slow_ = value;
+  started_ = true;
+  slow_ += share * (value - slow_);
+  const double fast = value - slow_;
+  slower_ += share * (fast - slower_);
+  return fast - slower_;
+}
+
+LengthWatch::LengthWatch(const SafetySettings& settings, const ArmParameters& arm)
+    : settling_ns_(to_ns(settings.length_settling_s)),
+      warning_{.relative = settings.length_warning},
+      fault_{.relative = settings.length_fault} {
+  for (const SegmentParameters& segment : arm.segments) length_m_.push_back(segment.length_m);
+  reset();
+}
+
+void LengthWatch::reset() noexcept {
+  for (Limit* limit : {&warning_, &fault_}) {
+    limit->since_ns.fill(kNever);
+    limit->exceeded = limit->beyond = false;
+  }
+}
+
+void LengthWatch::judge(std::int64_t capture_ns, const CurvatureEstimate& estimate) noexcept {
+  judge(capture_ns, estimate, warning_);
+  judge(capture_ns, estimate, fault_);
+}
+
+void LengthWatch::judge(std::int64_t capture_ns, const CurvatureEstimate& estimate,
+                        Limit& limit) noexcept {
+  if (limit.relative <= 0.0) return;
+  limit.exceeded = limit.beyond = false;
+  for (std::size_t i = 0; i < length_m_.size(); ++i) {
+    const double allowed_m = limit.relative * length_m_[i];
+    const bool evident =
+        estimate.valid[i] && 3.0 * std::sqrt(estimate.length_variance_m2[i]) <= allowed_m;
+    std::int64_t& since_ns = limit.since_ns[i];
+    if (evident) {
+      const bool off = std::abs(estimate.length_m[i] - length_m_[i]) > allowed_m;
+      since_ns = !off ? kNever : since_ns == kNever ? capture_ns : since_ns;
+    }
+    limit.beyond |= since_ns != kNever;
+    limit.exceeded |= since_ns != kNever && capture_ns - since_ns >= settling_ns_;
+  }
 }
 
 }  // namespace softarm

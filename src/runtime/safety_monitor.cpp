@@ -13,6 +13,10 @@ namespace {
 /// For this long after a stop of the daemon, messages may have been sent before its end: they were
 /// queued in the kernel.
 constexpr std::int64_t kStale_ns = 500'000'000;
+/// For this long after a command of another program, there may be a next one.
+constexpr std::int64_t kForeign_ns = 1'000'000'000;
+/// An `arm` waits for the vent to end, which takes less than 1 s, and for good frames.
+constexpr double kArmLapses_s = 2.0;
 
 /// Everything that a cause may depend on.
 struct Evidence {
@@ -24,6 +28,7 @@ struct Evidence {
   std::int64_t tick_gap_ns;
   std::int64_t measurement_age_ns;
   std::int64_t go_age_ns;
+  std::int64_t foreign_age_ns;
 
   /// Pressure is commanded, or may be in the next tick.
   bool pressurised() const {
@@ -39,39 +44,51 @@ struct Cause {
   bool (*present)(const Evidence&);
 };
 
-/// Every cause, the most severe first: `shutdown` because it is final, then by the mode they
-/// demand, then by what clears them: of two causes at once the stricter clearance must not be
-/// forgotten. Valves that are silent or do not follow are a fault where there is pressure; where there
+/// Every cause, the most severe first: an emergency stop, `shutdown` because it is final, then by
+/// the mode they demand, then by what clears them: of two causes at once the stricter clearance must
+/// not be forgotten. Valves that are silent or do not follow are a fault where there is pressure; where there
 /// is none they only keep the arm from becoming active, so that valves may be switched on after the
-/// daemon. Overruns are ticks missed in a row, and judged only under SCHED_FIFO
+/// daemon. So is an arm of another length, whose marker frames may still be put right. Overruns are ticks missed in a row, and judged only under SCHED_FIFO
 /// (consecutive_overruns is zero otherwise): without it they are only counted.
 constexpr std::array kCauses{
-    Cause{{Reason::shutdown, Mode::vent, Clearance::never},
-          [](const Evidence& e) { return e.input.requests.shutdown; }},
     Cause{{Reason::emergency_stop, Mode::fault, Clearance::disarm_then_arm},
           [](const Evidence& e) { return e.input.requests.emergency_stop; }},
+    Cause{{Reason::shutdown, Mode::vent, Clearance::never},
+          [](const Evidence& e) { return e.input.requests.shutdown; }},
     Cause{{Reason::valves_silent, Mode::fault, Clearance::disarm_then_arm},
           [](const Evidence& e) { return e.valves_silent() && e.pressurised(); }},
     Cause{{Reason::pressure_mismatch, Mode::fault, Clearance::disarm_then_arm},
           [](const Evidence& e) { return e.input.pressure_mismatch && e.pressurised(); }},
     Cause{{Reason::curvature_mismatch, Mode::fault, Clearance::disarm_then_arm},
           [](const Evidence& e) { return e.input.curvature_mismatch; }},
+    Cause{{Reason::length_mismatch, Mode::fault, Clearance::disarm_then_arm},
+          [](const Evidence& e) { return e.input.length_mismatch && e.pressurised(); }},
     Cause{{Reason::disarmed, Mode::vent, Clearance::arm},
           [](const Evidence& e) { return e.input.requests.disarm; }},
     Cause{{Reason::deadman_released, Mode::vent, Clearance::arm},
           [](const Evidence& e) {
             return e.input.deadman_used && e.go_age_ns > e.thresholds.deadman_timeout_ns;
           }},
+    Cause{{Reason::requests_lost, Mode::vent, Clearance::arm},
+          [](const Evidence& e) { return e.input.requests.lost; }},
+    Cause{{Reason::foreign_commands, Mode::vent, Clearance::arm},
+          [](const Evidence& e) { return e.foreign_age_ns <= kForeign_ns; }},
     Cause{{Reason::soft_limit, Mode::vent, Clearance::arm},
           [](const Evidence& e) { return e.input.soft_limit_exceeded; }},
     Cause{{Reason::activated_too_often, Mode::vent, Clearance::arm},
           [](const Evidence& e) { return e.input.activated_too_often; }},
+    Cause{{Reason::oscillation, Mode::vent, Clearance::arm},
+          [](const Evidence& e) { return e.input.oscillation; }},
     Cause{{Reason::valves_silent, Mode::vent, Clearance::good_frames},
           [](const Evidence& e) { return e.valves_silent(); }},
     Cause{{Reason::pressure_mismatch, Mode::vent, Clearance::good_frames},
           [](const Evidence& e) { return e.input.pressure_mismatch; }},
+    Cause{{Reason::length_mismatch, Mode::vent, Clearance::good_frames},
+          [](const Evidence& e) { return e.input.length_mismatch; }},
     Cause{{Reason::time_gap, Mode::vent, Clearance::good_frames},
-          [](const Evidence& e) { return e.tick_gap_ns > e.thresholds.vent_after_ns; }},
+          [](const Evidence& e) {
+            return e.input.paused || e.tick_gap_ns > e.thresholds.vent_after_ns;
+          }},
     Cause{{Reason::command_expired, Mode::vent, Clearance::good_frames},
           [](const Evidence& e) { return e.input.command_expired; }},
     Cause{{Reason::sender_restarted, Mode::vent, Clearance::good_frames},
@@ -151,6 +168,10 @@ const char* name(Reason reason) noexcept {
                               "pressure_mismatch",
                               "curvature_mismatch",
                               "command_expired",
+                              "oscillation",
+                              "length_mismatch",
+                              "foreign_commands",
+                              "requests_lost",
                               "frames_refused",
                               "frame_period_mismatch",
                               "activated_too_often"};
@@ -173,7 +194,10 @@ SafetyThresholds resolve_thresholds(const SafetySettings& settings,
   return {.hold_after_ns = to_ns(hold_s),
           .vent_after_ns = to_ns(vent_s),
           .valve_silence_ns = to_ns(settings.valve_silence_s),
-          .deadman_timeout_ns = to_ns(settings.deadman_timeout_s)};
+          .deadman_timeout_ns = to_ns(settings.deadman_timeout_s),
+          .arm_lapses_ns =
+              to_ns(kArmLapses_s + 2.0 * settings.good_frames *
+                                       std::max(settings.frame_period_s, control_period_s))};
 }
 
 SafetyMonitor::SafetyMonitor(const SafetySettings& settings, double control_period_s) noexcept
@@ -187,7 +211,7 @@ SafetyMonitor::SafetyMonitor(const SafetySettings& settings, double control_peri
 void SafetyMonitor::note_stop(const SafetyInput& input) noexcept {
   if (mode_ == Mode::init) return;
   const std::int64_t stopped_ns = input.now_ns - previous_tick_ns_;
-  if (stopped_ns > thresholds_.vent_after_ns || input.command_expired)
+  if (stopped_ns > thresholds_.vent_after_ns || input.paused || input.command_expired)
     deaf_until_ns_ = input.now_ns + kStale_ns;
   if (stopped_ns > thresholds_.valve_silence_ns &&
       input.newest_measurement_ns > listening_since_ns_)
@@ -207,7 +231,8 @@ CauseRule SafetyMonitor::worst_cause(const SafetyInput& input) const noexcept {
           input.newest_measurement_ns == kNever
               ? kForever
               : input.now_ns - std::max(input.newest_measurement_ns, listening_since_ns_),
-      .go_age_ns = age_ns(input.now_ns, input.newest_go_ns)};
+      .go_age_ns = age_ns(input.now_ns, input.newest_go_ns),
+      .foreign_age_ns = age_ns(input.now_ns, input.newest_foreign_ns)};
   for (const Cause& cause : kCauses)
     if (cause.present(evidence)) return named(cause.rule, input);
   return {Reason::none, Mode::active, Clearance::good_frames};
@@ -215,11 +240,21 @@ CauseRule SafetyMonitor::worst_cause(const SafetyInput& input) const noexcept {
 
 void SafetyMonitor::take_operator_requests(const SafetyInput& input, Mode demanded) noexcept {
   // Arming applies to what the operator sees now. It is never kept until a cause is gone, and an
-  // `arm` queued in the kernel while the daemon was stopped, which looks new, does not count.
-  if (input.requests.arm && demanded < Mode::vent && mode_ != Mode::fault &&
-      input.now_ns >= deaf_until_ns_)
+  // `arm` queued in the kernel while the daemon was stopped, which looks new, does not count. With
+  // explicit arming one that does not lead to ACTIVE lapses: nobody expects the arm to move long
+  // after a key press.
+  const bool lapses = settings_.arming == Arming::explicit_ && !under_control();
+  const bool hindered = demanded >= Mode::vent || (demanded == Mode::hold && lapses);
+  if (input.requests.arm && !hindered && mode_ != Mode::fault && input.now_ns >= deaf_until_ns_) {
+    if (!armed_ && lapses) arm_pending_since_ns_ = input.now_ns;
     armed_ = true;
-  if (input.requests.disarm || input.requests.shutdown) armed_ = false;
+  } else if (arm_pending_since_ns_ != kNever &&
+             (hindered || input.now_ns - arm_pending_since_ns_ > thresholds_.arm_lapses_ns)) {
+    armed_ = false;
+  }
+  // A request that was lost may have been one of these.
+  if (input.requests.disarm || input.requests.shutdown || input.requests.lost) armed_ = false;
+  if (!armed_) arm_pending_since_ns_ = kNever;
 }
 
 void SafetyMonitor::enter(const CauseRule& cause) noexcept {
@@ -240,6 +275,7 @@ void SafetyMonitor::try_to_activate(const SafetyInput& input, Reason otherwise) 
   } else {
     mode_ = Mode::active;
     reason_ = Reason::none;
+    arm_pending_since_ns_ = kNever;
   }
 }
 
@@ -299,9 +335,11 @@ Mode SafetyMonitor::step(const SafetyInput& input) noexcept {
       break;
     case Mode::fault:
       // Disarming acknowledges a fault whose cause has gone; the arm stays vented until it is armed
-      // again. An emergency stop is reported even if a fault came before it.
-      if (worst.reason == Reason::emergency_stop || worst.clearance == Clearance::never ||
-          (input.requests.disarm && worst.demands < Mode::fault))
+      // again. Nothing else leaves FAULT, the end of the daemon neither. An emergency stop is
+      // reported even if a fault came before it.
+      if (worst.reason == Reason::emergency_stop ||
+          (input.requests.disarm && worst.demands < Mode::fault &&
+           worst.clearance != Clearance::never))
         enter(worst);
       break;
   }

@@ -49,13 +49,20 @@ const PlantSettings& checked(const PlantSettings& settings) {
            std::to_string(segment.radius_m));
     expect(std::isfinite(segment.damping_nms_per_rad) && segment.damping_nms_per_rad >= 0.0,
            "damping >= 0 N m s/rad", std::to_string(segment.damping_nms_per_rad));
+    expect(std::isfinite(segment.axial_stiffness_n_per_m) && segment.axial_stiffness_n_per_m >= 0.0,
+           "axial stiffnesses >= 0 N/m", std::to_string(segment.axial_stiffness_n_per_m));
+    expect(std::isfinite(segment.axial_damping_ns_per_m) && segment.axial_damping_ns_per_m >= 0.0,
+           "axial damping >= 0 N s/m", std::to_string(segment.axial_damping_ns_per_m));
   }
+  expect(!settings.arm.extensible || settings.arm.actuation == ActuationModel::chamber,
+         "chamber for the actuation_model of an extensible arm", "couple");
   for (const auto& segment : settings.actuation.segments) {
     expect(settings.actuation.kind != ActuationKind::torque || segment.size() == 2,
            "two moments a segment", std::to_string(segment.size()));
     for (const Chamber& chamber : segment) {
       expect(std::isfinite(chamber.angle_rad) && std::isfinite(chamber.gain_nm_per_bar),
              "finite chamber angles and gains", "others");
+      expect(chamber.offset_m > 0.0, "offsets > 0 m", std::to_string(chamber.offset_m));
     }
   }
   return settings;
@@ -79,14 +86,14 @@ struct ArmPlant::Implementation {
         dead_time_s(settings.valves.dead_time_s),
         valves(settings.valves, chamber_count(settings.actuation),
                settings.actuation.kind == ActuationKind::torque),
-        map(input_map(settings.actuation)),
+        map(input_map(settings.actuation, settings.arm.extensible)),
         system(settings.kind.make(settings)),
         integrator(make_integrator(*system, integrator_settings(settings))),
         present_nm(Eigen::VectorXd::Zero(arm.dof())),
         target_nm(Eigen::VectorXd::Zero(arm.dof())),
         driven_nm(Eigen::VectorXd::Zero(arm.dof())),
         ends(static_cast<std::size_t>(arm.size())) {
-    Eigen::VectorXd u = Eigen::VectorXd::Zero(arm.dof());
+    Eigen::VectorXd u = Eigen::VectorXd::Zero(2 * arm.size());
     if (settings.initial_u_rad.size() > 0) {
       u = settings.initial_u_rad;
     }
@@ -192,7 +199,7 @@ void ArmPlant::advance(double t_end_s, std::span<const double> command_bar) {
 void ArmPlant::reset(ConstVectorRef u_rad, ConstVectorRef velocity_radps,
                      std::span<const double> pressure_bar) {
   Implementation& self = *implementation_;
-  const int dof = self.arm.dof();
+  const int dof = 2 * self.arm.size();
   expect(u_rad.size() == dof && velocity_radps.size() == dof,
          std::to_string(dof) + " numbers in u and velocity",
          std::to_string(u_rad.size()) + " and " + std::to_string(velocity_radps.size()));
@@ -217,8 +224,8 @@ Eigen::VectorXd ArmPlant::coordinate_rates() const noexcept {
 
 void ArmPlant::curvature(SegmentVector& u_rad, SegmentVector& velocity_radps) const noexcept {
   const Implementation& self = *implementation_;
-  u_rad.resize(self.arm.dof());
-  velocity_radps.resize(self.arm.dof());
+  u_rad.resize(2 * self.arm.size());
+  velocity_radps.resize(2 * self.arm.size());
   self.system->curvature(self.integrator->x(), self.integrator->v(), u_rad, velocity_radps);
 }
 

@@ -50,8 +50,11 @@ Integrator::Integrator(SecondOrderSystem& system, const IntegratorSettings& sett
   N_VConst(0.0, y_.get());
   tolerances_.reset(N_VNew_Serial(length(), context_.get()));
   N_VConst(settings.absolute_tolerance, tolerances_.get());
-  Map(N_VGetArrayPointer(tolerances_.get()) + size_, size_)
-      .setConstant(settings.absolute_tolerance_velocity);
+  for (Eigen::Index i = 0; i < size_; ++i) {
+    double* const tolerance = N_VGetArrayPointer(tolerances_.get()) + i;
+    tolerance[0] = settings.absolute_tolerance * system.unit(i);
+    tolerance[size_] = settings.absolute_tolerance_velocity * system.unit(i);
+  }
 }
 
 Integrator::~Integrator() = default;

@@ -1,6 +1,7 @@
 #include "simulation/pcc_system.hpp"
 
 #include <cmath>
+#include <limits>
 
 #include "softarm/model/actuation_matrix.hpp"
 #include "softarm/model/kinematics.hpp"
@@ -14,9 +15,10 @@ std::unique_ptr<PlantSystem> PccSettings::make(const PlantSettings& settings) co
 }
 
 PccSystem::PccSystem(const PlantSettings& settings, const ArmParameters& arm, int pieces)
-    : PlantSystem(settings),
+    : PlantSystem(settings, pieces == 1),
       segments_(settings.arm.size()),
       pieces_(pieces),
+      width_(arm.segment_dof()),
       arm_(arm),
       share_(arm_.size()),
       gravity_mps2_(arm_.gravity_mps2),
@@ -29,16 +31,18 @@ PccSystem::PccSystem(const PlantSettings& settings, const ArmParameters& arm, in
   }
   coriolis_.setZero(n, n);
   inertia_.setZero(n, n);
+  const Eigen::VectorXd zero = Eigen::VectorXd::Zero(n), one = Eigen::VectorXd::Ones(n);
+  add_impedance(arm_, one, zero, stiffness_);
+  add_impedance(arm_, zero, one, damping_);
   for (int j = 0; j < arm_.size(); ++j) {
     const SegmentParameters& piece = arm_.segments[static_cast<std::size_t>(j)];
     const SegmentParameters& whole = settings.arm.segments[static_cast<std::size_t>(j / pieces_)];
-    stiffness_.segment<2>(2 * j).setConstant(piece.stiffness_nm_per_rad);
-    damping_.segment<2>(2 * j).setConstant(piece.damping_nms_per_rad);
     // A segment without stiffness bends under no moment in particular: equally, then.
     share_[j] = pieces_ == 1 ? 1.0
                 : piece.stiffness_nm_per_rad > 0.0
                     ? whole.stiffness_nm_per_rad / piece.stiffness_nm_per_rad
                     : 1.0 / pieces_;
+    if (arm_.extensible && piece.constant_length) held_.push_back(3 * j + 2);
   }
 }
 
@@ -52,6 +56,17 @@ void PccSystem::add_couple(const Eigen::Vector2d& tau_nm, int first_piece, Const
   }
 }
 
+double PccSystem::unit(Eigen::Index i) const {
+  return i % width_ == 2 ? arm_.segments[static_cast<std::size_t>(i / width_)].length_m : 1.0;
+}
+
+bool PccSystem::has_lengths(ConstVector u) const {
+  for (int j = 0; j < arm_.size(); ++j) {
+    if (!(arm_.segments[static_cast<std::size_t>(j)].length_m + u[3 * j + 2] > 0.0)) return false;
+  }
+  return true;
+}
+
 void PccSystem::feel_base(double t_s) {
   if (external_loads_.base_moves()) {
     arm_.gravity_mps2 = gravity_mps2_ - external_loads_.base_acceleration_mps2(t_s);
@@ -61,7 +76,8 @@ void PccSystem::feel_base(double t_s) {
 void PccSystem::add_input(double t_s, ConstVector u, Vector out) {
   const bool couple = arm_.actuation == ActuationModel::couple;
   const Eigen::VectorXd& force = input_.force_nm(t_s);
-  for (int i = 0; i < segments_; ++i) {
+  if (arm_.extensible) out += force;  // one piece a segment, and no couple
+  for (int i = 0; i < segments_ && !arm_.extensible; ++i) {
     const int first = i * pieces_;
     if (!couple) {
       for (int j = first; j < first + pieces_; ++j) {
@@ -89,6 +105,9 @@ void PccSystem::residual(double t_s, ConstVector u, ConstVector velocity, ConstV
     loads_.add_payload(u, velocity, acceleration, arm_.gravity_mps2, out);
   }
   out += stiffness_.cwiseProduct(u) + damping_.cwiseProduct(velocity) - sum_;
+  if (!arm_.extensible) return;
+  for (const Eigen::Index e : held_) out[e] = acceleration[e];
+  if (!has_lengths(u)) out.setConstant(std::numeric_limits<double>::quiet_NaN());
 }
 
 bool PccSystem::acceleration(double t_s, ConstVector u, ConstVector velocity, Vector out) {
@@ -98,6 +117,7 @@ bool PccSystem::acceleration(double t_s, ConstVector u, ConstVector velocity, Ve
     below_ = -below_;
     inertia_matrix(arm_, workspace_, u, inertia_);
     loads_.add_payload(u, velocity, inertia_, coriolis_);
+    if (arm_.extensible) hold_constant_lengths(arm_, inertia_, below_);
     return solve_inertia(workspace_, inertia_, below_, out);
   }
   sum_.setZero();
@@ -114,6 +134,10 @@ void PccSystem::linearize(double t_s, ConstVector u, ConstVector velocity, Const
   }
   by_velocity = 2.0 * coriolis_;  // C(u, a) b is symmetric in a and b
   by_velocity.diagonal() += damping_;
+  for (const Eigen::Index e : held_) {
+    by_acceleration.row(e) = Eigen::RowVectorXd::Unit(u.size(), e);
+    by_velocity.row(e).setZero();
+  }
   // Central differences: step^2 and round-off / step balance near the cube root of the round-off.
   constexpr double kStep = 1e-5;
   shifted_ = u;
@@ -153,8 +177,9 @@ double PccSystem::potential_energy_j(ConstVector u) {
 }
 
 void PccSystem::spread(ConstVector u, Vector x) const {
+  x.setZero();
   for (int j = 0; j < arm_.size(); ++j) {
-    x.segment<2>(2 * j) = share_[j] * u.segment<2>(2 * (j / pieces_));
+    x.segment<2>(width_ * j) = share_[j] * u.segment<2>(2 * (j / pieces_));
   }
 }
 
@@ -168,8 +193,10 @@ void PccSystem::segment_ends(ConstVector x, std::span<Eigen::Isometry3d> ends) c
 
 void PccSystem::curvature(ConstVector x, ConstVector v, Vector u, Vector rate) const {
   if (pieces_ == 1) {
-    u = x;
-    rate = v;
+    for (int i = 0; i < segments_; ++i) {
+      u.segment<2>(2 * i) = x.segment<2>(width_ * i);
+      rate.segment<2>(2 * i) = v.segment<2>(width_ * i);
+    }
     return;
   }
   for (int i = 0; i < segments_; ++i) {

@@ -12,7 +12,8 @@
 namespace softarm {
 
 /// r = B u'' + C u' + D u' + G + K u - A tau_A(t) - J' f_ext, where u are the curvatures of all
-/// pieces: the kinds pcc and refined. The moment of a segment's chambers follows
+/// pieces: the kinds pcc and refined. Of an arm that is extensible, one piece a segment, (u, e); r is
+/// NaN where a segment would have no length left. The moment of a segment's chambers follows
 /// the body and acts on each of its pieces alike; the paper's couple has fixed axes, those of the
 /// segment's start, and acts between there and the segment's end.
 class PccSystem final : public PlantSystem {
@@ -21,6 +22,7 @@ class PccSystem final : public PlantSystem {
   PccSystem(const PlantSettings& settings, const ArmParameters& arm, int pieces);
 
   int size() const override { return arm_.dof(); }
+  double unit(Eigen::Index i) const override;  ///< of e: the segment's length at rest
   void residual(double t_s, ConstVector u, ConstVector velocity, ConstVector acceleration,
                 Vector out) override;
   bool acceleration(double t_s, ConstVector u, ConstVector velocity, Vector out) override;
@@ -41,12 +43,15 @@ class PccSystem final : public PlantSystem {
   /// out += A tau_A(t) + J' f_ext.
   void add_input(double t_s, ConstVector u, Vector out);
   void add_couple(const Eigen::Vector2d& tau_nm, int first_piece, ConstVector u, Vector out) const;
+  bool has_lengths(ConstVector u) const;
 
   int segments_;
-  int pieces_;                    // a segment
-  ArmParameters arm_;             // of pieces
-  Eigen::VectorXd share_;         // of a segment's bend under a uniform moment, one a piece
-  Eigen::Vector3d gravity_mps2_;  // without the base's acceleration
+  int pieces_;                      // a segment
+  int width_;                       // coordinates a piece
+  std::vector<Eigen::Index> held_;  // e of segments of constant length in an extensible arm
+  ArmParameters arm_;               // of pieces
+  Eigen::VectorXd share_;           // of a segment's bend under a uniform moment, one a piece
+  Eigen::Vector3d gravity_mps2_;    // without the base's acceleration
   PccLoads loads_;
   DynamicsWorkspace workspace_;
   Eigen::VectorXd stiffness_, damping_;            // diagonals of K and D

@@ -1,6 +1,8 @@
 #include "softarm/simulation/plant_system.hpp"
 
 #include <Eigen/Cholesky>
+#include <stdexcept>
+#include <string>
 
 #include "softarm/model/segment.hpp"
 #include "softarm/simulation/settings.hpp"
@@ -28,8 +30,13 @@ void differences(const Eigen::VectorXd& x, double step, const Function& function
 
 }  // namespace
 
-PlantSystem::PlantSystem(const PlantSettings& settings)
-    : input_(2 * settings.arm.size()), external_loads_(settings), segments_arm_(settings.arm) {}
+PlantSystem::PlantSystem(const PlantSettings& settings, bool stretches)
+    : input_(settings.arm.dof()), external_loads_(settings), segments_arm_(settings.arm) {
+  if (settings.arm.extensible && !stretches) {
+    throw std::invalid_argument(std::string("plant.arm.extensible: expected false for kind ") +
+                                settings.kind.name() + ", got true");
+  }
+}
 
 bool PlantSystem::acceleration(double t_s, ConstVector x, ConstVector v, Vector a) {
   const Eigen::VectorXd zero = Eigen::VectorXd::Zero(size());
@@ -99,10 +106,13 @@ PlantShape PlantSystem::arcs(const ArmParameters& arm, ConstVector u) {
   Eigen::Isometry3d frame = Eigen::Isometry3d::Identity();
   frame.linear() = arm.base_rotation;
   frame.translation() = arm.base_position_m;
-  PlantShape shape{.bend_rad = u, .points_m = {frame.translation()}};
+  PlantShape shape{.bend_rad = Eigen::VectorXd(2 * arm.size()), .points_m = {frame.translation()}};
+  const int width = arm.segment_dof();
   for (int i = 0; i < arm.size(); ++i) {
-    const double length_m = arm.segments[static_cast<std::size_t>(i)].length_m;
-    const Eigen::Vector2d bend = u.segment<2>(2 * i);
+    const double elongation_m = arm.extensible ? u[width * i + 2] : 0.0;
+    const double length_m = arm.segments[static_cast<std::size_t>(i)].length_m + elongation_m;
+    const Eigen::Vector2d bend = u.segment<2>(width * i);
+    shape.bend_rad.segment<2>(2 * i) = bend;
     for (int k = 1; k <= kPointsOfAnArc; ++k)
       shape.points_m.emplace_back(frame *
                                   segment_point(length_m, bend, double(k) / kPointsOfAnArc));

@@ -41,6 +41,7 @@ bool decode(std::span<const std::byte> bytes, ArmStatus& out) {
   out.frame_number = message.frame_number;
   out.configuration_hash = static_cast<std::uint64_t>(message.configuration_hash);
   out.seed = static_cast<std::uint64_t>(message.seed);
+  out.nonce = message.nonce;
   out.version = message.version;
   out.mode = static_cast<Mode>(message.mode);
   out.reason = static_cast<Reason>(message.reason);
@@ -51,6 +52,7 @@ bool decode(std::span<const std::byte> bytes, ArmStatus& out) {
   out.reference_limited = has(Message::REFERENCE_LIMITED);
   out.soft_limit = has(Message::SOFT_LIMIT);
   out.bounded = has(Message::BOUNDED);
+  out.length_warning = has(Message::LENGTH);
   out.frame_age_s = static_cast<double>(message.frame_age_s);
   out.frames_accepted = message.frames_accepted;
   out.frames_rejected = message.frames_rejected;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "softarm/base/clock.hpp"
 #include "softarm/base/time.hpp"
@@ -15,9 +16,18 @@ namespace {
 /// Frames accepted between two ticks; LCM drops more, which then count as missing.
 constexpr int kFrameCapacity = TickRecorder::kMostFrames;
 constexpr int kOtherCapacity = 16;
-/// After a silence of this length a sender of references or requests may restart its sequence
-/// numbers.
+/// Requests and goes: so many in a tick are a flood, in which others may have been dropped.
+constexpr int kRequestCapacity = 64;
+/// After a silence of this length a sender of references may restart its sequence numbers.
 constexpr std::int64_t kNumberForgotten_ns = 500'000'000;
+/// Longer than the repetitions of one key press last. People's machines may have different clocks,
+/// from which the numbers come: after this time another machine's `arm` counts.
+constexpr std::int64_t kPress_ns = 2'500'000'000;
+/// A stop of the process that may have filled the socket; and for how long it is being emptied.
+constexpr std::int64_t kStop_ns = 50'000'000;
+constexpr std::int64_t kStopEnds_ns = 500'000'000;
+/// A report that the valves are vented counts for so long.
+constexpr std::int64_t kVentedFor_ns = 1'000'000'000;
 
 }  // namespace
 
@@ -31,8 +41,7 @@ DaemonLink::DaemonLink(const PipelineSettings& settings, const TransportSettings
       newest_measurement_ns_(kNever),
       newest_go_ns_(kNever),
       go_sequence_(kNever),
-      reference_sequence_(kNever),
-      operator_sequence_(kNever) {
+      reference_sequence_(kNever) {
   if (!lcm_.tick_channel.empty()) recorder_.emplace(settings, provenance, shadow);
   frames_.resize(static_cast<std::size_t>(
       recorder_ ? std::min(kFrameCapacity, recorder_->frame_capacity()) : kFrameCapacity));
@@ -41,6 +50,8 @@ DaemonLink::DaemonLink(const PipelineSettings& settings, const TransportSettings
                      &reference_message_.acceleration_radps2})
     list->reserve(2 * kMaxSegments);
   measurement_message_.pressure_bar.reserve(kMaxChambers);
+  heard_pressures_.pressure_bar.reserve(kMaxChambers);
+  heard_torques_.torque_nm.reserve(kMaxChambers);
   measured_bar_.setZero(std::ssize(messages_.pressure_command.pressure_bar));
 
   for (std::size_t k = 0; k < mocap_.channels().size(); ++k)
@@ -48,28 +59,45 @@ DaemonLink::DaemonLink(const PipelineSettings& settings, const TransportSettings
                     [this, k](const auto& packet) { take_frame(k, packet); });
   node_.subscribe(lcm_.reference_channel, kOtherCapacity,
                   [this](const auto& packet) { take_reference(packet); });
-  node_.subscribe(lcm_.operator_channel, kOtherCapacity,
+  node_.subscribe(lcm_.operator_channel, kRequestCapacity,
                   [this](const auto& packet) { take_operator(packet); });
-  if (settings.safety.valve_readback)
+  // Whether valves have vented is heard even where their pressures are not judged.
+  valve_readback_ = settings.safety.valve_readback;
+  if (valve_readback_ || !shadow)
     node_.subscribe(lcm_.measurement_channel, kOtherCapacity,
                     [this](const auto& packet) { take_measurement(packet); });
   if (!lcm_.deadman_channel.empty())
-    node_.subscribe(lcm_.deadman_channel, kOtherCapacity,
+    node_.subscribe(lcm_.deadman_channel, kRequestCapacity,
                     [this](const auto& packet) { take_go(packet); });
+  if (!shadow)  // beside a shadow another daemon commands
+    node_.subscribe(lcm_.command_channel, kOtherCapacity,
+                    [this](const auto& packet) { take_command(packet); });
+  dropped_ = node_.dropped();
 }
 
 TickInput DaemonLink::collect(std::int64_t now_ns) noexcept {
-  now_ns_ = now_ns;
+  const std::int64_t previous_ns = std::exchange(now_ns_, now_ns);
   frame_count_ = 0;
+  requests_ = goes_ = 0;
+  released_ = false;
   input_ = {};
   input_.now_ns = now_ns;
+  input_.paused = pause_.paused() || paused_while_deciding_;
+  paused_while_deciding_ = false;
+  if (input_.paused) sent_us_ = kNever;  // its validity has passed, on whatever clock
   input_.command_expired = command_expired(now_ns / 1000);
-  node_.drain(static_cast<int>(mocap_.channels().size()) * kFrameCapacity + 4 * kOtherCapacity);
+  node_.drain(static_cast<int>(mocap_.channels().size()) * kFrameCapacity + 2 * kRequestCapacity +
+              3 * kOtherCapacity);
+  input_.requests.lost = requests_lost(previous_ns);
+  // Of two inputs the one that is released is right; in a flood it may be the one not heard.
+  if (released_ || goes_ >= kRequestCapacity) newest_go_ns_ = kNever;
   if (frame_count_ < frames_.size() && mocap_.overdue(now_ns, frames_[frame_count_]))
     ++frame_count_;
   input_.frames = {frames_.data(), frame_count_};
+  input_.command_expired |= valves_vented_ && age_ns(now_ns, valves_heard_ns_) < kVentedFor_ns;
   input_.newest_measurement_ns = newest_measurement_ns_;
   input_.newest_go_ns = newest_go_ns_;
+  input_.newest_foreign_ns = newest_foreign_ns_;
   return input_;
 }
 
@@ -107,21 +135,42 @@ void DaemonLink::take_reference(const ReceivedMessage& packet) noexcept {
 }
 
 void DaemonLink::take_operator(const ReceivedMessage& packet) noexcept {
+  ++requests_;
   if (!decode(packet.bytes, operator_message_)) {
     ++malformed_;
     return;
   }
-  const bool newer = operator_message_.sequence > operator_sequence_ ||
-                     age_ns(now_ns_, newest_operator_ns_) > kNumberForgotten_ns;
-  if (newer) operator_sequence_ = operator_message_.sequence;
-  newest_operator_ns_ = now_ns_;
-  // A request to vent is obeyed whatever its sequence number; so is a request of an unknown kind.
   using Request = softarm_messages::operator_command_t;
-  const bool arm = operator_message_.request == Request::ARM;
-  const bool emergency = operator_message_.request == Request::EMERGENCY_STOP;
+  const auto& [sequence, nonce, request] = operator_message_;
+  const std::int64_t now_us = now_ns_ / 1000;
+  if (age_ns(now_ns_, newest_request_ns_) > kPress_ns) newest_sequence_ = kNever;
+  newest_request_ns_ = now_ns_;
+  newest_sequence_ = std::max(newest_sequence_, sequence);
+  if (request == Request::ARM) {
+    const bool younger = sequence > refused_sequence_ || age_ns(now_ns_, refused_ns_) > kPress_ns;
+    input_.requests.arm |= younger && nonces_.accepts(nonce, now_us, vented_us_);
+    return;
+  }
+  // A request to vent is obeyed whatever its number and nonce; so is a request of an unknown kind.
+  // But only somebody who has seen the FAULT acknowledges it, not one of a flood, nor a record.
+  const bool emergency = request == Request::EMERGENCY_STOP;
+  const bool acknowledges = request == Request::DISARM && nonces_.accepts(nonce, now_us, fault_us_);
   input_.requests.emergency_stop |= emergency;
-  input_.requests.disarm |= !arm && !emergency;
-  input_.requests.arm |= arm && newer;
+  input_.requests.disarm |= !emergency && (mode_ != Mode::fault || acknowledges);
+  if (emergency) fault_us_ = now_us;
+  vented_us_ = now_us;
+  refused_ns_ = now_ns_;
+  refused_sequence_ = newest_sequence_;
+}
+
+/// LCM and the socket drop the newest without a word: what they dropped may have been a stop. The
+/// socket is judged only after a stop of this process: in a flood of other channels a stop is
+/// repeated until it is seen to work.
+bool DaemonLink::requests_lost(std::int64_t previous_ns) noexcept {
+  if (previous_ns != 0 && now_ns_ - previous_ns > kStop_ns) stopped_ns_ = now_ns_;
+  const std::int64_t before = std::exchange(dropped_, node_.dropped());
+  const bool after_stop = age_ns(now_ns_, stopped_ns_) < kStopEnds_ns;
+  return requests_ >= kRequestCapacity || (after_stop && dropped_ != before);
 }
 
 void DaemonLink::take_measurement(const ReceivedMessage& packet) noexcept {
@@ -132,6 +181,8 @@ void DaemonLink::take_measurement(const ReceivedMessage& packet) noexcept {
     ++malformed_;
     return;
   }
+  if (messages_.pressure_command.shadow == 0) take_valves_report();
+  if (!valve_readback_) return;
   newest_measurement_ns_ = arrival_ns(packet);
   if (measurement_message_.time_us < measurement_time_us_) ++backward_measurements_;
   measurement_time_us_ = measurement_message_.time_us;
@@ -140,25 +191,55 @@ void DaemonLink::take_measurement(const ReceivedMessage& packet) noexcept {
   if (messages_.pressure_command.shadow == 0) input_.measured_bar = &measured_bar_;
 }
 
+/// Valves that hold no command of ours, or have held none for a while since their last report, have
+/// vented: our command was lost, late, or refused, whatever else is known.
+void DaemonLink::take_valves_report() noexcept {
+  const bool fell = valves_heard_ns_ != kNever && measurement_message_.expired != valves_expired_;
+  valves_expired_ = measurement_message_.expired;
+  valves_vented_ = measurement_message_.sequence < 0;
+  valves_heard_ns_ = now_ns_;
+  granted_us_ = std::max(measurement_message_.validity_us, 0);
+  input_.command_expired |= fell || valves_vented_;
+}
+
 void DaemonLink::take_go(const ReceivedMessage& packet) noexcept {
+  ++goes_;
   if (!decode(packet.bytes, deadman_message_)) {
     ++malformed_;
     return;
   }
-  if (deadman_message_.go == 0) newest_go_ns_ = kNever;
-  if (deadman_message_.go == 0 || deadman_message_.sequence == go_sequence_) return;
+  if (deadman_message_.go == 0) released_ = true;
+  if (deadman_message_.go == 0 || deadman_message_.sequence == go_sequence_ ||
+      !nonces_.accepts(deadman_message_.nonce, now_ns_ / 1000, kNever))
+    return;
   go_sequence_ = deadman_message_.sequence;
   newest_go_ns_ = arrival_ns(packet);
+}
+
+void DaemonLink::take_command(const ReceivedMessage& packet) noexcept {
+  const auto take = [&](auto& message) {
+    if (!decode(packet.bytes, message)) {
+      ++malformed_;
+    } else if (message.shadow == 0 && !sent_.contains(message.sequence, message.time_us)) {
+      newest_foreign_ns_ = arrival_ns(packet);
+    }
+  };
+  messages_.by_torque() ? take(heard_torques_) : take(heard_pressures_);
 }
 
 void DaemonLink::publish_command(std::int64_t now_ns, const TickOutput& output) noexcept {
   messages_.set_command(++commands_, output);
   const std::int64_t now_us = now_ns / 1000;
+  if (pause_.paused()) {
+    paused_while_deciding_ = true;
+    sent_us_ = kNever;
+  }
   if (command_expired(now_us) && !input_.command_expired) {
     ++unsent_;
     return;
   }
   messages_.pressure_command.time_us = messages_.torque_command.time_us = now_us;
+  sent_.add(commands_, now_us);
   const std::string& channel = lcm_.command_channel;
   const bool sent = messages_.by_torque() ? node_.publish(channel, messages_.torque_command)
                                           : node_.publish(channel, messages_.pressure_command);
@@ -167,7 +248,12 @@ void DaemonLink::publish_command(std::int64_t now_ns, const TickOutput& output) 
 }
 
 bool DaemonLink::command_expired(std::int64_t now_us) const noexcept {
-  return sent_us_ == kNever || now_us - sent_us_ >= messages_.pressure_command.validity_us;
+  return sent_us_ == kNever || now_us - sent_us_ >= held_us();
+}
+
+std::int32_t DaemonLink::held_us() const noexcept {
+  const std::int32_t asked_us = messages_.pressure_command.validity_us;
+  return granted_us_ > 0 ? std::min(asked_us, granted_us_) : asked_us;
 }
 
 void DaemonLink::publish_status(std::int64_t now_ns, const ControlPipeline& pipeline,
@@ -175,6 +261,12 @@ void DaemonLink::publish_status(std::int64_t now_ns, const ControlPipeline& pipe
   messages_.set_status(timing.ticks, pipeline);
   auto& status = messages_.status;
   status.time_us = now_ns / 1000;
+  status.nonce = nonces_.at(status.time_us);
+  // This status is the first that shows it.
+  const Mode mode = pipeline.output().mode;
+  if (mode >= Mode::vent && mode_ < Mode::vent) vented_us_ = status.time_us;
+  if (mode == Mode::fault && mode_ != Mode::fault) vented_us_ = fault_us_ = status.time_us;
+  mode_ = mode;
   status.overruns = counter(timing.overruns);
   status.messages_malformed = counter(malformed_);
   if (!node_.publish(lcm_.status_channel, status)) ++unsent_;

@@ -1,6 +1,7 @@
 #include "softarm/transport/daemon_loop.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "softarm/base/clock.hpp"
 #include "softarm/base/realtime.hpp"
@@ -44,7 +45,7 @@ void DaemonLoop::run(const std::function<bool()>& stop_requested,
                 .since_start_ns = woken_ns - start_ns,
                 .on_time = missed == 0,
                 .stopping = stopping});
-    if (stopping && pipeline_.output().reason == Reason::shutdown && pipeline_.fully_vented())
+    if (stopping && pipeline_.output().mode >= Mode::vent && pipeline_.fully_vented())
       ++vented_commands;
   }
   // Repeats the records sent only once, a few at a time: a logger's queue is short.
@@ -54,6 +55,7 @@ void DaemonLoop::run(const std::function<bool()>& stop_requested,
 void DaemonLoop::tick(std::int64_t woken_ns, bool stopping) noexcept {
   TickInput input = link_.collect(woken_ns);
   input.requests.shutdown = stopping;
+  input.requests.emergency_stop |= std::exchange(begin_stopped_, false);
   input.consecutive_overruns = judge_overruns_ ? missed_in_row_ : 0;
   const TickOutput& output = pipeline_.tick(input);
   const std::int64_t decided_ns = monotonic_now_ns();

@@ -131,11 +131,6 @@ bool EventLogReader::next(LogEvent& event) {
   return true;
 }
 
-EventLogWriter::EventLogWriter(const std::filesystem::path& file)
-    : path_(file), file_(file, std::ios::binary | std::ios::trunc) {
-  if (!file_) throw std::runtime_error(path_.string() + ": expected a file that can be written");
-}
-
 void EventLogWriter::write(std::int64_t time_us, std::string_view channel,
                            std::span<const std::byte> data) {
   if (channel.empty() || channel.size() > EventLogReader::kLargestChannel ||
@@ -151,23 +146,10 @@ void EventLogWriter::write(std::int64_t time_us, std::string_view channel,
   put_number(static_cast<std::uint64_t>(time_us), 8, to);
   put_number(channel.size(), 4, to);
   put_number(data.size(), 4, to);
-  const auto put = [this](const void* bytes, std::size_t size) {
-    file_.write(static_cast<const char*>(bytes), static_cast<std::streamsize>(size));
-  };
-  put(header.data(), header.size());
-  put(channel.data(), channel.size());
-  put(data.data(), data.size());
-  check();
-}
-
-void EventLogWriter::close() {
-  file_.close();
-  check();
-}
-
-void EventLogWriter::check() {
-  if (!file_)
-    throw std::runtime_error(path_.string() + ": could not be written; is the disk full?");
+  event_.assign(reinterpret_cast<const char*>(header.data()), header.size());
+  event_ += channel;
+  event_.append(reinterpret_cast<const char*>(data.data()), data.size());
+  file_.write(event_);
 }
 
 }  // namespace softarm

@@ -2,12 +2,20 @@
 
 #include <arpa/inet.h>
 #include <lcm/lcm.h>
+#include <linux/sock_diag.h>
 #include <poll.h>
+#include <sys/eventfd.h>
+#include <sys/select.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <cerrno>
 #include <cstdlib>
+#include <cstring>
+#include <fstream>
 #include <string_view>
 
 #include "softarm/base/clock.hpp"
@@ -30,10 +38,60 @@ ArrivalClock clock_from_now() noexcept {
   return {now.monotonic_ns, now.wall_ns};
 }
 
+/// LCM waits with select(), which aborts above FD_SETSIZE; where descriptors are lacking it reports
+/// something else. @throws TransportError
+void expect_descriptors() {
+  std::array<int, 16> opened{};  // more than LCM needs
+  std::size_t count = 0;
+  while (count < opened.size() && (opened[count] = eventfd(0, EFD_CLOEXEC)) >= 0) ++count;
+  const int error = errno;
+  const int highest = count > 0 ? opened[count - 1] : -1;
+  for (std::size_t each = 0; each < count; ++each) close(opened[each]);
+  if (count < opened.size())
+    throw TransportError(std::string("LCM needs 16 file descriptors: ") + std::strerror(error) +
+                         ". Raise the limit (ulimit -n), or close some");
+  if (highest >= FD_SETSIZE)
+    throw TransportError("LCM needs file descriptors below " + std::to_string(FD_SETSIZE) +
+                         ", and this process has opened or inherited nearly all of them: close "
+                         "them before it starts");
+}
+
+/// Which descriptors are UDP sockets that may receive.
+std::vector<bool> bound_udp_sockets() {
+  std::vector<bool> found(FD_SETSIZE);  // LCM's are below it
+  for (int each = 0; each < FD_SETSIZE; ++each) {
+    int type = 0;
+    sockaddr_in address{};
+    socklen_t type_size = sizeof type, size = sizeof address;
+    found[static_cast<std::size_t>(each)] =
+        getsockopt(each, SOL_SOCKET, SO_TYPE, &type, &type_size) == 0 && type == SOCK_DGRAM &&
+        getsockname(each, reinterpret_cast<sockaddr*>(&address), &size) == 0 &&
+        address.sin_family == AF_INET && address.sin_port != 0;
+  }
+  return found;
+}
+
+/// The kernel's buffer of packets not yet read is as large as the administrator permits: until it
+/// is full, no request to a daemon that does not run for a while is lost.
+std::string with_large_buffer(const std::string& url) {
+  if (!url.starts_with("udpm://") || url.find("recv_buf_size") != std::string::npos) return url;
+  constexpr long kEnough = 8'000'000;
+  long permitted = 0;
+  std::ifstream("/proc/sys/net/core/rmem_max") >> permitted;
+  if (permitted <= 0) return url;
+  return url + (url.find('?') == std::string::npos ? '?' : '&') +
+         "recv_buf_size=" + std::to_string(std::min(permitted, kEnough));
+}
+
+lcm_t* create(const std::string& url) {
+  expect_descriptors();
+  return lcm_create(with_large_buffer(url).c_str());
+}
+
 }  // namespace
 
 LcmNode::LcmNode(const std::string& url)
-    : lcm_(lcm_create(url.c_str())), arrivals_(clock_from_now()), buffer_(kLargestMessage) {
+    : lcm_(create(url)), arrivals_(clock_from_now()), buffer_(kLargestMessage) {
   if (lcm_ == nullptr)
     throw TransportError("LCM cannot start on \"" + url +
                          "\". Without a multicast route give this machine one: "
@@ -58,6 +116,8 @@ void LcmNode::dispatch(const lcm_recv_buf_t* packet, const char* /*channel*/, vo
 }
 
 void LcmNode::subscribe(const std::string& channel, int capacity, Handler handler) {
+  const bool first = subscriptions_.empty();  // it makes LCM open the socket
+  const std::vector<bool> before = first ? bound_udp_sockets() : std::vector<bool>();
   Subscription& stored = subscriptions_.emplace_back(std::move(handler), &arrivals_);
   lcm_subscription_t* subscription =
       lcm_subscribe(lcm_, quoted(channel).c_str(), dispatch, &stored);
@@ -66,6 +126,18 @@ void LcmNode::subscribe(const std::string& channel, int capacity, Handler handle
                          "\". Without a multicast route give this machine one: "
                          "ip link set lo up; ip route add 224.0.0.0/4 dev lo");
   lcm_subscription_set_queue_capacity(subscription, capacity);
+  if (!first) return;
+  const std::vector<bool> after = bound_udp_sockets();
+  for (std::size_t each = 0; each < after.size(); ++each)
+    if (after[each] && !before[each]) socket_ = static_cast<int>(each);
+}
+
+std::int64_t LcmNode::dropped() const noexcept {
+  std::array<std::uint32_t, SK_MEMINFO_VARS> figures{};
+  socklen_t size = sizeof figures;
+  if (socket_ < 0 || getsockopt(socket_, SOL_SOCKET, SO_MEMINFO, figures.data(), &size) != 0)
+    return 0;
+  return figures[SK_MEMINFO_DROPS];
 }
 
 int LcmNode::drain(int limit) noexcept {
@@ -94,6 +166,14 @@ bool LcmNode::send(const char* channel, int size) noexcept {
   return lcm_publish(lcm_, channel, buffer_.data(), static_cast<unsigned int>(size)) == 0;
 }
 
+std::string network_warning(const std::string& url) {
+  const char* const other = std::getenv("LCM_DEFAULT_URL");
+  if (other == nullptr || *other == 0) return {};
+  if (lock_name("", other) == lock_name("", url)) return {};
+  return std::string("LCM_DEFAULT_URL is ") + other + ", daemon.lcm.url is " + url +
+         ": softarm uses the latter, other LCM programs of this shell do not hear it";
+}
+
 std::string lock_name(const std::string& channel, const std::string& url) {
   constexpr std::string_view kUdp = "udpm://";
   std::string network = url.substr(0, url.find('?'));
@@ -111,6 +191,12 @@ std::string lock_name(const std::string& channel, const std::string& url) {
     }
   }
   return channel + " on " + network;
+}
+
+bool is_local(const std::string& url) {
+  const std::size_t ttl = url.find("ttl=");
+  return url.starts_with("udpm://") &&
+         (ttl == std::string::npos || std::strtol(url.c_str() + ttl + 4, nullptr, 0) == 0);
 }
 
 }  // namespace softarm

@@ -33,14 +33,18 @@ std::int64_t length32_at(std::span<const std::byte> bytes, std::size_t offset) n
 /// A length within [0, limit], or -1.
 int bounded(int length, int limit) noexcept { return length <= limit ? length : -1; }
 
-/// Whether a text of `length` bytes, terminator included, ends there and not before. LCM's decoder
-/// accepts any byte as the terminator; its encoder writes up to the first 0.
+/// Whether a text of `length` bytes, terminator included, ends there and not before, and is printable
+/// ASCII: it comes to somebody's terminal. LCM's decoder accepts any byte as the terminator; its
+/// encoder writes up to the first 0.
 bool text_at(std::span<const std::byte> bytes, std::size_t offset, std::int64_t length) noexcept {
   if (length < 1 || length > static_cast<std::int64_t>(kLongestText)) return false;
   const auto size = static_cast<std::size_t>(length);
   if (bytes.size() < offset + size) return false;
   const auto text = bytes.subspan(offset, size);
-  return std::find(text.begin(), text.end(), std::byte{0}) == text.end() - 1;
+  return text.back() == std::byte{0} &&
+         std::all_of(text.begin(), text.end() - 1, [](std::byte each) {
+           return each >= std::byte{' '} && each <= std::byte{'~'};
+         });
 }
 
 template <class Message>
@@ -80,7 +84,7 @@ bool decode(std::span<const std::byte> bytes,
 
 bool decode(std::span<const std::byte> bytes,
             softarm_messages::pressure_measurement_t& message) noexcept {
-  return decode_list(bytes, 8 + 8, 4, kMaxChambers, message);
+  return decode_list(bytes, 8 + 8 + 4 + 4 + 1, 4, kMaxChambers, message);
 }
 
 bool decode(std::span<const std::byte> bytes,
@@ -90,12 +94,12 @@ bool decode(std::span<const std::byte> bytes,
 
 bool decode(std::span<const std::byte> bytes,
             softarm_messages::operator_command_t& message) noexcept {
-  return decode_exactly(bytes, kHash + 8 + 1, message);
+  return decode_exactly(bytes, kHash + 2 * 8 + 1, message);
 }
 
 bool decode(std::span<const std::byte> bytes,
             softarm_messages::controller_status_t& message) noexcept {
-  constexpr std::size_t kBeforeVersion = 5 * 8;
+  constexpr std::size_t kBeforeVersion = 6 * 8;
   const std::int64_t version = length32_at(bytes, kHash + kBeforeVersion);
   if (!text_at(bytes, kHash + kBeforeVersion + 4, version)) return false;
   const std::size_t counts =
@@ -125,7 +129,7 @@ bool decode(std::span<const std::byte> bytes, softarm_messages::timing_t& messag
 }
 
 bool decode(std::span<const std::byte> bytes, softarm_messages::tick_record_t& message) noexcept {
-  constexpr std::size_t kCounts = kHash + 6 * 8 + 4 + 6;  // numbers and flags come first
+  constexpr std::size_t kCounts = kHash + 7 * 8 + 4 + 8;  // numbers and flags come first
   const int chambers = bounded(length16_at(bytes, kCounts), kMaxChambers);
   const int dimension = bounded(length16_at(bytes, kCounts + 2), 2 * kMaxSegments);
   const int frames = bounded(length16_at(bytes, kCounts + 4), TickRecorder::kMostFrames);
@@ -149,7 +153,7 @@ bool decode(std::span<const std::byte> bytes, softarm_messages::valves_status_t&
 }
 
 bool decode(std::span<const std::byte> bytes, softarm_messages::deadman_t& message) noexcept {
-  return decode_exactly(bytes, kHash + 8 + 1, message);
+  return decode_exactly(bytes, kHash + 2 * 8 + 1, message);
 }
 
 bool decode(std::span<const std::byte> bytes,

@@ -20,6 +20,7 @@ std::int16_t flags_of(const TickOutput& output, bool shadow) noexcept {
   if (shadow) flags |= Status::SHADOW;
   if (output.armed) flags |= Status::ARMED;
   if (output.bounded) flags |= Status::BOUNDED;
+  if (output.length_warning) flags |= Status::LENGTH;
   return static_cast<std::int16_t>(flags);
 }
 

@@ -1,6 +1,7 @@
 #include "softarm/transport/valves_link.hpp"
 
 #include <algorithm>
+#include <limits>
 #include <span>
 
 #include "softarm/actuation/pressure_allocator.hpp"
@@ -24,10 +25,13 @@ ValvesLink::ValvesLink(const LcmSettings& lcm, ValveDriver& driver)
     : lcm_(lcm),
       driver_(driver),
       node_(lcm.url),
-      pressure_bar_(static_cast<std::size_t>(driver.written_bar().size())) {
+      pressure_bar_(static_cast<std::size_t>(driver.written_bar().size())),
+      local_(is_local(lcm.url)) {
   command_.pressure_bar.reserve(kMaxChambers);
   measurement_.num_chambers = static_cast<std::int16_t>(pressure_bar_.size());
   measurement_.pressure_bar.assign(pressure_bar_.size(), 0.0F);
+  measurement_.validity_us = static_cast<std::int32_t>(std::min<std::int64_t>(
+      driver.guard().commands().longest_ns() / 1000, std::numeric_limits<std::int32_t>::max()));
   status_.num_chambers = measurement_.num_chambers;
   status_.set_point_bar = measurement_.pressure_bar;
   status_.actual_bar = measurement_.pressure_bar;
@@ -37,7 +41,9 @@ ValvesLink::ValvesLink(const LcmSettings& lcm, ValveDriver& driver)
 
 void ValvesLink::take(const ReceivedMessage& packet) noexcept {
   if (discarding_) return;
-  if (!decode(packet.bytes, command_)) {
+  const std::int64_t now_ns = monotonic_now_ns();
+  if (!decode(packet.bytes, command_) ||
+      (local_ && is_untimely(command_.time_us, command_.validity_us, now_ns / 1000))) {
     ++refused_;
     return;
   }
@@ -49,9 +55,10 @@ void ValvesLink::take(const ReceivedMessage& packet) noexcept {
   const CommandVerdict verdict = driver_.command(
       {.sequence = command_.sequence,
        .validity_ns = std::int64_t{command_.validity_us} * 1000,
+       .sent_us = command_.time_us,
        .shadow = command_.shadow != 0,
        .pressure_bar = std::span<const double>(pressure_bar_).first(fits ? count : 0)},
-      monotonic_now_ns());
+      now_ns);
   refused_ += verdict == CommandVerdict::malformed;
 }
 
@@ -68,7 +75,10 @@ void ValvesLink::drain(bool take) noexcept {
 
 void ValvesLink::publish_measurement(std::int64_t now_ns) noexcept {
   put(driver_.read_back().actual_bar, measurement_.pressure_bar);
+  const ValveGuard& guard = driver_.guard();
   measurement_.sequence = driver_.written_sequence();
+  measurement_.expired = static_cast<std::int32_t>(guard.counters().times_vented);
+  measurement_.reason = static_cast<std::int8_t>(guard.reason());
   measurement_.time_us = now_ns / 1000;
   node_.publish(lcm_.measurement_channel, measurement_);
 }

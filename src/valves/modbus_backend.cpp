@@ -14,7 +14,9 @@ ModbusBackend::ModbusBackend(const ValveDriverSettings& settings, double max_pre
       max_pressure_bar_(max_pressure_bar),
       terminal_(settings),
       out_(static_cast<std::size_t>(write_size(settings.registers, settings.order))),
-      in_(static_cast<std::size_t>(read_size(settings.registers, settings.order))) {}
+      in_(static_cast<std::size_t>(read_size(settings.registers, settings.order))) {
+  put_timeout(settings.registers, settings.failsafe_timeout_s, timeout_);
+}
 
 bool ModbusBackend::connect() noexcept {
   refusal_[0] = '\0';
@@ -23,31 +25,38 @@ bool ModbusBackend::connect() noexcept {
 
 ValveBackend::Secured ModbusBackend::secure() noexcept {
   const RegisterMap& map = settings_.registers;
-  std::array<std::uint16_t, 2> wanted{}, found{};
-  put_timeout(map, settings_.failsafe_timeout_s, wanted);
-  const auto count = static_cast<std::size_t>(map.timeout_words);
-  LinkResult result = terminal_.write(map.timeout_address, std::span(wanted).first(count));
-  if (result == LinkResult::ok)
-    result = terminal_.read(map.timeout_address, std::span(found).first(count));
-  const bool confirmed =
-      result == LinkResult::ok &&
-      std::equal(found.begin(), found.begin() + map.timeout_words, wanted.begin());
+  const auto words = std::span(timeout_).first(static_cast<std::size_t>(map.timeout_words));
   refusal_[0] = '\0';
-  if (!confirmed && (result == LinkResult::ok || result == LinkResult::exception_reply)) {
-    constexpr const char* kFix =
-        "set valves.failsafe_timeout_s to what the terminal takes, or "
-        "valves.registers.timeout_address";
-    const double set_s = settings_.failsafe_timeout_s;
-    const auto end =
-        result == LinkResult::ok
-            ? fmt::format_to_n(refusal_.data(), refusal_.size() - 1,
-                               "set {} s at register {}, read back {} s; {}", set_s,
-                               map.timeout_address, timeout_s_of(map, found), kFix)
-            : fmt::format_to_n(refusal_.data(), refusal_.size() - 1, "{} s at register {}: {}; {}",
-                               set_s, map.timeout_address, terminal_.error(), kFix);
-    *end.out = '\0';
+  const LinkResult result = terminal_.write(map.timeout_address, words);
+  if (result == LinkResult::ok) return check();
+  if (result == LinkResult::exception_reply) refuse(terminal_.error());
+  return {result, false};
+}
+
+ValveBackend::Secured ModbusBackend::check() noexcept {
+  const RegisterMap& map = settings_.registers;
+  std::array<std::uint16_t, 2> found{};
+  const auto count = static_cast<std::size_t>(map.timeout_words);
+  refusal_[0] = '\0';
+  const LinkResult result = terminal_.read(map.timeout_address, std::span(found).first(count));
+  const bool confirmed = result == LinkResult::ok &&
+                         std::equal(found.begin(), found.begin() + count, timeout_.begin());
+  if (result == LinkResult::exception_reply) refuse(terminal_.error());
+  if (result == LinkResult::ok && !confirmed) {
+    std::array<char, 40> text{};
+    fmt::format_to_n(text.data(), text.size() - 1, "read back {} s", timeout_s_of(map, found));
+    refuse(text.data());
   }
   return {result, confirmed};
+}
+
+void ModbusBackend::refuse(const char* what) noexcept {
+  const auto end = fmt::format_to_n(
+      refusal_.data(), refusal_.size() - 1,
+      "set {} s at register {}, {}; set valves.failsafe_timeout_s to what the terminal takes, or "
+      "valves.registers.timeout_address",
+      settings_.failsafe_timeout_s, settings_.registers.timeout_address, what);
+  *end.out = '\0';
 }
 
 LinkResult ModbusBackend::write(const Eigen::VectorXd& set_points_bar) noexcept {

@@ -33,9 +33,9 @@ bool SimulatedTerminal::readable(int address, int count) const noexcept {
          within(address, count, map_.read_address, read_size(map_, order_));
 }
 
-void SimulatedTerminal::served(int, int) noexcept { served_ = true; }
+void SimulatedTerminal::served(int, int count) noexcept { written_ |= count > 0; }
 
-bool SimulatedTerminal::take_served() noexcept { return std::exchange(served_, false); }
+bool SimulatedTerminal::take_written() noexcept { return std::exchange(written_, false); }
 
 void SimulatedTerminal::measure(const Eigen::VectorXd& actual_bar) noexcept {
   for (std::size_t i = 0; i < order_.size(); ++i) {

@@ -52,35 +52,61 @@ bool ValveDriver::cycle(std::int64_t now_ns) noexcept {
       break;
     }
     case ValveAction::exchange:
-      // If the request was delayed since the decision, the hardware may have vented by itself.
-      guard_.wake(clock_());
       measured = exchange(now_ns);
       break;
   }
-  if (guard_.state() == ValveState::disconnected && backend_->is_open()) {
-    // If the hardware still receives, it vents at once instead of after its time-out.
-    if (guard_.reason() != ValveReason::no_connection) backend_->write(zero_);
-    backend_->close();
-  }
+  if (guard_.state() == ValveState::disconnected && backend_->is_open()) give_up();
   return measured;
 }
 
+/// Reads before it writes: what the hardware holds decides whether it may have pressure.
 bool ValveDriver::exchange(std::int64_t now_ns) noexcept {
+  const bool measured = guard_.may_read() && read(now_ns);
+  if (guard_.failsafe_due(now_ns)) {
+    const auto [checked, as_set] = guard_.failsafe_lost() ? backend_->secure() : backend_->check();
+    if (!as_set) keep_error();
+    guard_.failsafe_checked(checked, as_set, now_ns);
+  }
+  // If the requests took long since the decision, the hardware may have vented by itself.
+  wake(clock_());
+  if (guard_.state() == ValveState::disconnected) return measured;
+  if (!guard_.may_write() && !backend_->answers_writes()) return measured;
   written_bar_ = guard_.set_points_bar();
   sequence_ = guard_.sequence();
-  LinkResult result = backend_->write(written_bar_);
-  if (result == LinkResult::ok) result = backend_->read(newest_);
+  const LinkResult result = backend_->write(written_bar_);
+  if (result != LinkResult::ok) keep_error();
+  guard_.written(result, now_ns);
+  return measured;
+}
+
+bool ValveDriver::read(std::int64_t now_ns) noexcept {
+  LinkResult result = backend_->read(newest_);
   if (result != LinkResult::ok) {
     keep_error();
   } else if (!is_finite(newest_, zero_.size())) {
     result = LinkResult::no_answer;
     std::strcpy(error_.data(), "pressures that are not numbers");
   }
-  guard_.exchanged(result, newest_, now_ns);
-  if (result != LinkResult::ok) return false;
-  std::swap(read_back_, newest_);
-  exchanged_since_stop_ = stopping_;
-  return true;
+  guard_.measured(result, newest_, now_ns);
+  if (result == LinkResult::ok) std::swap(read_back_, newest_);
+  return result == LinkResult::ok;
+}
+
+/// If the hardware still receives, it vents at once instead of after its time-out; if it takes no
+/// zero, another request would only keep it alive.
+void ValveDriver::give_up() noexcept {
+  if (guard_.reason() == ValveReason::zero_unconfirmed) {
+    Eigen::Index chamber = 0;
+    const double bar = read_back_.actual_bar.maxCoeff(&chamber);
+    const auto end = fmt::format_to_n(
+        error_.data(), error_.size() - 1,
+        FMT_STRING("chamber {} reads {:.3f} bar; no request is sent, so that it vents by itself"),
+        chamber, bar);
+    *end.out = '\0';
+  } else if (guard_.reason() != ValveReason::no_connection) {
+    backend_->write(zero_);
+  }
+  backend_->close();
 }
 
 void ValveDriver::keep_error() noexcept {
@@ -90,12 +116,13 @@ void ValveDriver::keep_error() noexcept {
 void ValveDriver::stop(std::int64_t now_ns) noexcept {
   stopping_ = true;
   stop_ns_ = now_ns;
+  cycles_at_stop_ = guard_.counters().cycles;
   guard_.stop();
 }
 
 bool ValveDriver::stopped(std::int64_t now_ns) const noexcept {
   if (!stopping_) return false;
-  return (exchanged_since_stop_ && guard_.zero_confirmed()) ||
+  return (guard_.zero_confirmed() && guard_.counters().cycles > cycles_at_stop_) ||
          guard_.state() == ValveState::disconnected || now_ns - stop_ns_ >= kMostStopping_ns;
 }
 
@@ -111,6 +138,8 @@ std::string_view ValveDriver::text(std::span<char> buffer) const noexcept {
   if (reason == ValveReason::failsafe_refused)
     return put(FMT_STRING("{} ({}: {}); no pressure is written"), state, name(reason),
                error_.data());
+  if (reason == ValveReason::failsafe_changed)
+    return put(FMT_STRING("{} ({}: {})"), state, name(reason), error_.data());
   if (const int chamber = guard_.chamber(); chamber >= 0)
     return put(FMT_STRING("{}{}{}{}: chamber {} (valve {}) set to {:.3f} bar reads {:.3f} bar"),
                state, open, name(reason), close, chamber, order_[static_cast<std::size_t>(chamber)],

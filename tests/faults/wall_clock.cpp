@@ -1,5 +1,6 @@
-// A library to be loaded before all others (LD_PRELOAD): the wall clock is set while a program
-// runs, for that program alone. The monotonic clock is left as it is.
+// A library to be loaded before all others (LD_PRELOAD): while a program runs, its wall clock is
+// set, its machine seems to have been suspended, or paused without any clock counting it; for that
+// program alone.
 #include <fcntl.h>
 #include <sys/mman.h>
 #include <sys/socket.h>
@@ -16,11 +17,13 @@
 namespace {
 
 struct Shared {
-  std::atomic<std::int64_t> offset_s;  ///< written by the test
-  std::atomic<std::int64_t> reads;     ///< of the wall clock, written here
+  std::atomic<std::int64_t> offset_s;      ///< written by the test
+  std::atomic<std::int64_t> reads;         ///< of the wall clock, written here
+  std::atomic<std::int64_t> suspended_ns;  ///< CLOCK_BOOTTIME is ahead by so much
+  std::atomic<std::int64_t> lost_ns;  ///< CLOCK_MONOTONIC and CLOCK_BOOTTIME are behind by so much
 };
 
-/// The file that SOFTARM_WALL_CLOCK names, two 64-bit integers.
+/// The file that SOFTARM_WALL_CLOCK names, four 64-bit integers.
 Shared* shared() {
   static Shared* const memory = [] {
     const char* path = std::getenv("SOFTARM_WALL_CLOCK");
@@ -38,12 +41,21 @@ std::int64_t offset_s() {
   return shared()->offset_s.load();
 }
 
+void add(timespec& time, std::int64_t ns) {
+  constexpr std::int64_t kSecond = 1'000'000'000;
+  const std::int64_t sum = time.tv_sec * kSecond + time.tv_nsec + ns;
+  time = {.tv_sec = sum / kSecond, .tv_nsec = sum % kSecond};
+}
+
 }  // namespace
 
 extern "C" int clock_gettime(clockid_t clock, timespec* time) noexcept {
   const auto result = static_cast<int>(syscall(SYS_clock_gettime, clock, time));
   if (result == 0 && (clock == CLOCK_REALTIME || clock == CLOCK_REALTIME_COARSE))
     time->tv_sec += offset_s();
+  if (result == 0 && clock == CLOCK_BOOTTIME)
+    add(*time, shared()->suspended_ns.load() - shared()->lost_ns.load());
+  if (result == 0 && clock == CLOCK_MONOTONIC) add(*time, -shared()->lost_ns.load());
   return result;
 }
 

@@ -60,6 +60,11 @@ std::vector<std::string> replay_words();
 void run_recording(std::span<const std::byte> input);
 std::vector<Bytes> recording_seeds();
 std::vector<std::string> recording_words();
+void run_table(std::span<const std::byte> input);
+std::vector<Bytes> table_seeds();
+std::vector<std::string> table_words();
+void run_timeline(std::span<const std::byte> input);
+std::vector<Bytes> timeline_seeds();
 void run_frames(std::span<const std::byte> input);
 std::vector<Bytes> frames_seeds();
 

@@ -25,6 +25,8 @@ const std::vector<FuzzTarget>& fuzz_targets() {
       {"yaml", run_yaml, yaml_seeds, yaml_words, 4096, kLong},
       {"log", run_log, log_seeds, log_words, 4096, kLong},
       {"replay", run_replay, replay_seeds, replay_words, 8192, kLong},
+      {"timeline", run_timeline, timeline_seeds, decoder_words, 4096, kLong},
+      {"table", run_table, table_seeds, table_words, 4096, kLong},
       {"recording", run_recording, recording_seeds, recording_words, 4096, kLong},
       {"frames", run_frames, frames_seeds, decoder_words, 4096, 100'000},
   };

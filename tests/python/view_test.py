@@ -67,4 +67,5 @@ with tempfile.TemporaryDirectory() as folder:
 answers(["--help"], 0, "CONFIG")
 answers([], 64, "CONFIG")
 answers(["/nowhere.yaml"], 78, "no such file")
-answers([CONFIG, "--log", "/nowhere.csv"], 74, "/nowhere.csv")
+answers([CONFIG, "--log", "/nowhere.csv"], 1, "/nowhere.csv")
+answers([CONFIG, "--log", "x", "--control"], 64, "--control")

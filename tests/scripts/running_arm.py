@@ -57,8 +57,10 @@ def write_config(folder, base, url, more="", name=None, safety=SAFETY, daemon=""
 
 def start(test, folder, *command):
     """A process that is ended when `test` ends, a test or its class; what it prints goes to FOLDER/PROGRAM.txt."""
+    # No daemon finds the FAULT of another test.
+    environment = {**os.environ, "XDG_STATE_HOME": str(folder)}
     with open(folder / f"{pathlib.Path(command[0]).name}.txt", "w", encoding="utf-8") as output:
-        process = subprocess.Popen(command, stdout=output, stderr=output)
+        process = subprocess.Popen(command, stdout=output, stderr=output, env=environment)
 
     def end():
         process.send_signal(signal.SIGTERM)

@@ -82,6 +82,8 @@ ALLOWED = [
     ("name: good", "name: 7"),
     ("length_m: 0.11", "length_m: [0.11, 1.2e-1]"),
     ("mass_kg: 0.15", "mass_kg: .15, radius_m: 0"),
+    ("mass_kg: 0.15", "mass_kg: 1/8"),
+    ("length_m: 0.11", "length_m: [1/8, +0.1e0/.9]"),
     ("mass_kg: 0.15", "mass_kg: 0.15, base: {rotation: [[1, 0, 0], [0, 1, 0], [0, 0, 1]]}"),
     ("2*pi/3", "+2.0*pi/3"),
     ("2*pi/3, 4*pi/3", "0.7*pi, -0.6*pi"),
@@ -175,7 +177,7 @@ class Schema(unittest.TestCase):
         safety = self.validator.schema["properties"]["daemon"]["properties"]["safety"]["properties"]
         period = safety["frame_period_s"]
         self.assertIn("(a number in (0, 10] s)", period["description"])
-        self.assertEqual((period["type"], period["exclusiveMinimum"], period["maximum"], period["default"]), ("number", 0, 10, 0.005))
+        self.assertEqual((period["type"], period["exclusiveMinimum"], period["maximum"], period["default"]), (["number", "string"], 0, 10, 0.005))
         self.assertEqual(safety["arming"]["enum"], ["automatic", "explicit"])
         self.assertEqual(safety["valve_readback"]["type"], "boolean")
         self.assertEqual(safety["good_frames"]["type"], "integer")

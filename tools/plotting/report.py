@@ -4,6 +4,8 @@ import html
 
 import numpy as np
 
+from . import style
+
 PAGE = """<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
 <title>{title}</title>
@@ -146,7 +148,7 @@ def write(log, figures, from_s, title):
         pictures.append(f'<figure><img alt="{html.escape(caption)}" src="data:image/png;base64,{data}">'
                         f"<figcaption>{html.escape(caption)}</figcaption></figure>")
     path = log.directory / "report.html"
-    path.write_text(PAGE.format(title=html.escape(title), origin=html.escape(log.origin),
-                                tables="".join(map(_as_html, tables(log, from_s))), figures="\n".join(pictures)),
-                    encoding="utf-8")
+    page = PAGE.format(title=html.escape(title), origin=html.escape(log.origin),
+                       tables="".join(map(_as_html, tables(log, from_s))), figures="\n".join(pictures))
+    style.replace(path, lambda partial: partial.write_text(page, encoding="utf-8"))
     return path

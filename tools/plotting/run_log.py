@@ -18,7 +18,7 @@ def _number(cell):
 
 
 def _read_json(path):
-    return json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
+    return json.loads(path.read_text(encoding="utf-8", errors="replace")) if path.exists() else {}
 
 
 class RunLog:
@@ -26,7 +26,8 @@ class RunLog:
 
     def __init__(self, directory):
         self.directory = pathlib.Path(directory)
-        with open(self.directory / "log.csv", newline="", encoding="utf-8") as file:
+        # A name in another encoding (logs of earlier versions) is no reason to draw nothing.
+        with open(self.directory / "log.csv", newline="", encoding="utf-8", errors="replace") as file:
             lines = file.read().splitlines()
         comments = [line.lstrip("# ") for line in lines if line.startswith("#")]
         rows = list(csv.reader(line for line in lines if line and not line.startswith("#")))
@@ -143,7 +144,7 @@ class ShapeLog:
     _known = {}
 
     def __init__(self, path):
-        with open(path, encoding="utf-8") as file:
+        with open(path, encoding="utf-8", errors="replace") as file:
             lines = [line for line in file.read().splitlines() if line and not line.startswith("#")]
         names = lines[0].split(",")
         rows = [line.split(",") for line in lines[1:]]

@@ -1,4 +1,6 @@
 """Appearance of our plots: one set of colours, fonts and helpers for every figure."""
+import os
+
 import matplotlib
 
 matplotlib.use("Agg")
@@ -63,6 +65,14 @@ def at_least(axes, span):
         axes.set_ylim(middle - span / 2, middle + span / 2)
 
 
+def replace(path, write):
+    """Lets `write` make the file beside its place and puts it there whole: never through a link, into another file."""
+    partial = path.with_name(f".partial.{path.name}")
+    partial.unlink(missing_ok=True)
+    write(partial)
+    os.replace(partial, path)
+
+
 def finish(figure, path, title, handles=(), row_gap=0.22, left_margin=0.72, column_gap=0.85):
     """Title on the left, legend right of it in the same line, everything in its place (inches), saved."""
     width, height = figure.get_size_inches()
@@ -78,5 +88,5 @@ def finish(figure, path, title, handles=(), row_gap=0.22, left_margin=0.72, colu
     if handles:
         figure.legend(handles=list(handles), loc="upper right", ncol=len(handles), handlelength=1.8,
                       columnspacing=1.4, bbox_to_anchor=(0.995, 1 - 0.03 / height), borderaxespad=0.2)
-    figure.savefig(path)
+    replace(path, figure.savefig)
     plt.close(figure)

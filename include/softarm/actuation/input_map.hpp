@@ -13,7 +13,12 @@ namespace softarm {
 /// the simulated arm has a mismatch).
 Eigen::Matrix2Xd input_map(ActuationKind kind, const std::vector<Chamber>& segment);
 
-/// Input map of the whole arm, 2n x chambers in the order of the valves: f = map p.
-Eigen::MatrixXd input_map(const ActuationSettings& settings);
+/// The axial force of every chamber's pressure on one segment, N per bar: its effective area, gain
+/// over offset. 0 with actuation by torque.
+Eigen::RowVectorXd axial_input_map(ActuationKind kind, const std::vector<Chamber>& segment);
+
+/// Input map of the whole arm, 2n x chambers in the order of the valves: f = map p. Where segments
+/// stretch, 3n x chambers with the axial force as every third row.
+Eigen::MatrixXd input_map(const ActuationSettings& settings, bool extensible = false);
 
 }  // namespace softarm

@@ -9,6 +9,10 @@ namespace softarm {
 /// `wanted` is not finite or `max_step` is not positive.
 double step_towards(double previous, double wanted, double max_step) noexcept;
 
+/// Moves from `previous` towards `wanted`: away from zero by at most `max_rise` >= 0, towards zero
+/// at once. Returns zero if `wanted` is not finite.
+double rise_towards(double previous, double wanted, double max_rise) noexcept;
+
 /// The last stage before the valves: pressure limits, slew limit, vent ramp. Holds no state.
 class PressureRamps {
  public:

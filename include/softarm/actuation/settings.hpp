@@ -9,10 +9,11 @@
 namespace softarm {
 
 /// A chamber at angle chi about the segment's axis: pressure p adds -gain p (cos chi, sin chi) to
-/// the generalized force in u.
+/// the generalized force in u and, where segments stretch, gain p / offset to that on e.
 struct Chamber {
   double angle_rad = 0.0;
-  double gain_nm_per_bar = 0.839;
+  double gain_nm_per_bar = 0.839;  ///< effective area times offset
+  double offset_m = 0.0125;        ///< of the chamber's centroid from the axis
 
   bool operator==(const Chamber&) const = default;
 };

@@ -21,6 +21,25 @@ struct ClockPair {
 /// the two readings.
 ClockPair read_clocks() noexcept;
 
+/// Notices pauses in which CLOCK_MONOTONIC stood still: the machine was suspended, or its virtual
+/// machine was paused by a host that reports it. CLOCK_BOOTTIME then goes on, so the difference of
+/// the two changes; nothing else changes it. A pause that neither clock counts cannot be seen here.
+class PauseWatch {
+ public:
+  PauseWatch() noexcept;
+  /// Whether there was a pause since the last call (at first: since construction).
+  bool paused() noexcept;
+
+ private:
+  /// Bounds of CLOCK_BOOTTIME minus CLOCK_MONOTONIC in ns: they are never read at one instant.
+  struct Difference {
+    std::int64_t least_ns, most_ns;
+  };
+  static Difference read() noexcept;
+
+  Difference known_;
+};
+
 /// CLOCK_REALTIME in ns since 1970: the only clock that two machines, or two boots of one machine,
 /// share. It may be set at any time, also backwards.
 std::int64_t wall_now_ns() noexcept;

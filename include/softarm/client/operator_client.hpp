@@ -94,14 +94,19 @@ class OperatorClient {
   /// Also passes the messages of this channel to `on_message`. @throws TransportError
   void listen(const std::string& channel) { listen(channel, {}); }
 
-  /// Sends one request and does not wait. @throws TransportError if it could not be sent
+  /// Sends one request and does not wait. An `arm`, and a `disarm` that shall acknowledge a FAULT,
+  /// count only if a status was handled within the last second. @throws TransportError if it could
+  /// not be sent
   void send(OperatorRequest what);
-  /// Sends requests 20 times a second until a status received after the first request shows the
-  /// result, or until `patience_s` have passed. Blocks. @throws TransportError if none could be
-  /// sent
+  /// Sends one request 20 times a second until a status received after the first shows the result,
+  /// or until `patience_s` have passed. All carry the number and the nonce of this call: the daemon
+  /// refuses an `arm` a second after the call, and from a later disarm or emergency stop on. A
+  /// request that vents is sent at once, an `arm` once a status was received. Blocks. @throws
+  /// TransportError if none could be sent
   RequestOutcome request(OperatorRequest what, double patience_s = 2.0);
   /// Sends the dead-man input: "go" (true) holds for safety.deadman_timeout_s from its arrival, or
-  /// until it is withdrawn (false). @throws TransportError; std::logic_error where
+  /// until it is withdrawn (false). It counts only if a status was handled within the last second.
+  /// @throws TransportError; std::logic_error where
   /// lcm.deadman_channel is empty
   void send_go(bool go);
 
@@ -143,7 +148,8 @@ class OperatorClient {
   bool handle_until(std::int64_t monotonic_ns, int most);
   void handle_round();
   void take_status(const ArmMessage& message);
-  bool try_to_send(OperatorRequest what);
+  bool try_to_send(OperatorRequest what, std::int64_t number, std::int64_t nonce);
+  std::int64_t newest_nonce() const { return status_ ? status_->nonce : 0; }
   [[noreturn]] static void throw_unsent();
 
   LcmSettings lcm_;

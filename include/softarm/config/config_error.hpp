@@ -3,6 +3,7 @@
 
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 namespace softarm {
 
@@ -19,6 +20,19 @@ class ConfigError : public std::runtime_error {
   /// Composes what() of its parts.
   ConfigError(std::string file_name, int line_number, std::string key_path,
               std::string expected_text, std::string got_text);
+
+ protected:
+  ConfigError(const ConfigError& first, const std::string& message);
+};
+
+/// All that is wrong with a configuration: the members are those of the first error, what() has a
+/// line for each.
+class ConfigErrors : public ConfigError {
+ public:
+  static constexpr std::size_t kMost = 20;  ///< in what()
+
+  /// @param errors  at least one
+  explicit ConfigErrors(const std::vector<ConfigError>& errors);
 };
 
 }  // namespace softarm

@@ -9,11 +9,13 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "softarm/base/keys.hpp"
+#include "softarm/base/output_file.hpp"
 #include "softarm/config/config_error.hpp"
 
 namespace softarm {
@@ -61,8 +63,10 @@ class ConfigKeys final : public Keys {
   ~ConfigKeys() override;
 
   /// Visits the keys that `describe` declares; reading, refuses all others. The result is a
-  /// section. @throws ConfigError, reading
+  /// section. @throws ConfigErrors, reading: all that is wrong
   Entry visit(const Body& describe);
+  /// The file and all that it includes.
+  const Files& files() const { return files_; }
   /// Whether the file says anything at this path ("a.b[1].c").
   bool given(std::string_view path) const { return locations_.find(path) != locations_.end(); }
   /// An error at a path, or at the nearest section around it that the file has.
@@ -77,6 +81,16 @@ class ConfigKeys final : public Keys {
 
  private:
   struct Frame;  ///< a section being read
+  struct Unknown {
+    const YamlNode* section;
+    std::size_t index;
+    std::string path;  ///< of the section
+    std::vector<std::string_view> known;
+  };
+
+  void report(const ConfigError& error);
+  void report_unknown();
+  void throw_errors();
 
   Entry& add(const Key& key, Entry::Kind kind);
   void visit_numbers(const Key& key, const Form& form, std::vector<double>& numbers) override;
@@ -85,13 +99,22 @@ class ConfigKeys final : public Keys {
   void visit_one_or_each(const Key& key, int count, bool all_equal, const ItemBody& item) override;
   const YamlNode* take(const Key& key, const std::string& expected);
   void enter(Entry& out, const YamlNode* node, const std::string& path, const Body& body);
+  void enter_section(const YamlNode* node, const std::string& path, const Body& body);
+  void read_numbers(const YamlNode& node, const Key& key, const Form& form,
+                    const std::string& expected, std::vector<double>& numbers);
   void enter_items(Entry& out, const YamlNode* list, int count, const ItemBody& item);
 
   Purpose purpose_;
+  Files files_;                            ///< before root_, which fills it
   std::vector<Entry>* entries_ = nullptr;  ///< of the section being visited
   std::unique_ptr<const YamlNode> root_;   ///< of the file that is read
   std::vector<Frame> frames_;
   std::map<std::string, Location, std::less<>> locations_;  ///< of every key read
+  std::set<std::string> declared_;  ///< paths of all keys visited, without indices
+  bool sizes_known_ = true;         ///< of lists that follow from other keys
+  std::vector<ConfigError> errors_;
+  std::vector<ConfigError> missing_;
+  std::vector<Unknown> unknown_;
 };
 
 }  // namespace softarm

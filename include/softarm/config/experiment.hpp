@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <string>
 
+#include "softarm/base/output_file.hpp"
 #include "softarm/base/realtime.hpp"
 #include "softarm/config/identification_settings.hpp"
 #include "softarm/config/motion_limits.hpp"
@@ -22,17 +23,25 @@ struct RunSettings {
   double log_rate_hz = 0.0;
 };
 
+/// How far the arm may differ from what is configured: what the check of the loop judges.
+struct ArmUncertainty {
+  double parameters = 0.1;  ///< of stiffness, damping, mass, length and gain, relative
+  double payload_kg = 0.0;  ///< at the tip, at most
+};
+
 /// An experiment as in its file, defaults filled in.
 struct Experiment : PipelineSettings {
   std::string name;
   std::uint64_t seed = 1;
   TransportSettings transport;
   RealtimeSettings realtime;
+  ArmUncertainty uncertainty;
   PlantSettings plant;
   ValveDriverSettings valves;
   RunSettings run;
   IdentificationSettings identification;
   MotionLimits motion_limits;
+  Files files;             ///< that it was read from: its own and all that it includes
   std::uint64_t hash = 0;  ///< FNV-1a of the resolved configuration's text
 };
 

@@ -28,8 +28,9 @@ struct ControlTerms {
 /// How a path of the tip becomes a motion of the segments: (21) as corrected, second order.
 struct TaskSpaceSettings {
   double lambda_1ps = 6.0;
-  double tip_bandwidth_radps = 10.0;
+  double tip_bandwidth_radps = 3.0;
   double posture_rate_1ps = 2.0;
+  double map_rate_1ps = 1.0;
 };
 
 /// What (17) makes of what the model-based observer found; nothing where there is none.

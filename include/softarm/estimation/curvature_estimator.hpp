@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -36,6 +37,13 @@ struct CurvatureEstimate {
   /// Rotation about the chord that a PCC segment with this chord does not have, in [-pi, pi]: the
   /// same, but not blind at any theta with a chord. It is twist_rad where there is no chord.
   std::array<double, kMaxSegments> torsion_rad{};
+  /// The length by the chord, l = |t| / c1(theta^2 / 4), m; its variance, first order in the noise
+  /// of both bodies, (sigma_t / c1)^2 + (l kappa)^2 var theta with l kappa = dl/dtheta; and its
+  /// covariance with theta. |t| does not feel the bodies' orientation. 0 and infinite where the
+  /// positions say nothing: inertial sensors, theta = 2 pi.
+  std::array<double, kMaxSegments> length_m{};
+  std::array<double, kMaxSegments> length_variance_m2{};
+  std::array<double, kMaxSegments> length_covariance_m_rad{};
   /// |t| minus the PCC chord L c1(theta^2 / 4); zero for a PCC segment whose length is right.
   std::array<double, kMaxSegments> length_error_m{};
   /// False: one of the segment's bodies was not seen, or its pose fits no bend; the segment's
@@ -52,11 +60,17 @@ struct SegmentCurvature {
   double variance_rad2 = 0.0;
   double twist_rad = 0.0;
   double torsion_rad = 0.0;
-  double chord_m = 0.0;  ///< |t|
+  double chord_m = 0.0;            ///< |t|
+  double chord_over_length = 0.0;  ///< c1(theta^2 / 4)
+  double length_m = 0.0;
+  double length_variance_m2 = std::numeric_limits<double>::infinity();
+  double length_covariance_m_rad = 0.0;
   bool valid = false;
 };
 
-/// The estimator. Constant after construction; `estimate` may be called from anywhere.
+/// The estimator. Constant after construction; `estimate` may be called from anywhere. Segments may
+/// stretch: u does not depend on the length, and e is `length_m` minus the length at rest, which the
+/// residual `length_error_m` is relative to.
 ///
 /// With (R, t) the relative transform (19) and q the quaternion of R, a PCC segment has
 /// t/|t| = (q_y, -q_x, q_w) = (sin(theta/2) cos phi, sin(theta/2) sin phi, cos(theta/2)): position

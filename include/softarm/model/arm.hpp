@@ -32,6 +32,9 @@ struct SegmentParameters {
   /// bends as the values above: k_a / k = beta_a / beta = area / second moment of area.
   double axial_stiffness_n_per_m = 4000.0;  ///< k_a
   double axial_damping_ns_per_m = 185.0;    ///< beta_a
+  /// A segment of an extensible arm that does not stretch: its e is 0 for good and its e'' is 0
+  /// whatever acts on it; the e row of the inverse dynamics is the force that holds it.
+  bool constant_length = false;
 };
 
 /// Where a segment's mass sits. `point` is the paper's (all of it at the centre of mass, no
@@ -69,5 +72,9 @@ struct ArmParameters {
   int segment_dof() const { return extensible ? 3 : 2; }
   int dof() const { return segment_dof() * size(); }
 };
+
+/// For what does not know segments that stretch. @throw std::invalid_argument for an arm that is
+/// extensible. @param who begins the message.
+void expect_constant_length(const ArmParameters& arm, const char* who);
 
 }  // namespace softarm

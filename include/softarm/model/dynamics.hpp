@@ -79,6 +79,11 @@ bool forward_dynamics(const ArmParameters& arm, DynamicsWorkspace& workspace, Co
 bool solve_inertia(DynamicsWorkspace& workspace, const Eigen::Ref<const Eigen::MatrixXd>& B,
                    ConstVectorRef rhs, VectorRef x) noexcept;
 
+/// Of an extensible arm whose B x = force is to be solved: takes the e of segments of
+/// `constant_length` out, so that their x is 0. O(n^2) for each of them.
+void hold_constant_lengths(const ArmParameters& arm, Eigen::Ref<Eigen::MatrixXd> B,
+                           VectorRef force) noexcept;
+
 /// 1/2 u'^T B u', in J. O(n).
 double kinetic_energy(const ArmParameters& arm, DynamicsWorkspace& workspace, ConstVectorRef u,
                       ConstVectorRef velocity) noexcept;
@@ -90,7 +95,7 @@ double gravity_potential(const ArmParameters& arm, ConstVectorRef u) noexcept;
 void add_tip_force(const ArmParameters& arm, ConstVectorRef u, const Eigen::Vector3d& force_n,
                    VectorRef generalized_force) noexcept;
 
-/// force += K u + D u' of (14): k I and beta I a segment in u.
+/// force += K u + D u' of (14): k I and beta I a segment in u, k_a and beta_a in e.
 void add_impedance(const ArmParameters& arm, ConstVectorRef u, ConstVectorRef velocity,
                    VectorRef generalized_force) noexcept;
 

@@ -2,13 +2,12 @@
 #pragma once
 
 #include <cstdint>
-#include <cstdio>
 #include <filesystem>
-#include <memory>
 #include <string>
 #include <vector>
 
 #include "softarm/base/histogram.hpp"
+#include "softarm/base/output_file.hpp"
 #include "softarm/config/experiment.hpp"
 #include "softarm/runtime/log_row.hpp"
 
@@ -17,28 +16,44 @@ namespace softarm {
 /// Writes FOLDER/log.csv, one row per tick.
 class ExperimentLog {
  public:
-  /// @throws std::runtime_error if the folder or the file cannot be made
-  ExperimentLog(const std::filesystem::path& folder, const Experiment& experiment);
+  /// @param inputs  files that are read beside the experiment's
+  /// @throws OutputIsInput, OutputError if the folder or the file cannot be made
+  ExperimentLog(const std::filesystem::path& folder, const Experiment& experiment,
+                const Files& inputs = {});
 
-  /// Appends a row.
+  /// Appends a row. @throws OutputError if it could not be written (a full disk); whole rows are
+  /// kept
   void add(const LogRow& row);
 
-  /// Flushes and closes. @throws std::runtime_error if anything could not be written (a full disk).
-  void close();
+  /// Flushes and closes. @throws OutputError if anything could not be written
+  void close() { file_.commit(); }
 
  private:
-  struct Closer {
-    void operator()(std::FILE* file) const { std::fclose(file); }
-  };
   void cell(double value);
   void cells(const double* values, int count, int expected);
 
-  std::filesystem::path path_;
-  std::unique_ptr<std::FILE, Closer> file_;
+  OutputFile file_;
   int segments_;
   int chambers_;
   std::string line_;
 };
+
+/// summary.json and timing.json of a run. Opened before it, with space for them: a disk that fills
+/// up meanwhile does not take them.
+class SummaryFiles {
+ public:
+  /// @throws OutputIsInput, OutputError
+  SummaryFiles(const std::filesystem::path& folder, const Experiment& experiment,
+               const Files& inputs = {});
+  /// @throws OutputError
+  void write(const std::string& summary, const std::string& timing);
+
+ private:
+  OutputFile summary_, timing_;
+};
+
+/// The files of an experiment and `more`: what none of its outputs may replace.
+Files inputs_of(const Experiment& experiment, const Files& more);
 
 /// The line `# softarm VERSION commit ...` at the start of every log.
 std::string provenance_line(const Experiment& experiment);
@@ -56,8 +71,5 @@ struct TimingReport {
 };
 /// The text of timing.json: quantiles, maxima and counts of all histograms, in us.
 std::string timing_json(const TimingReport& report);
-
-/// Writes a text file. @throws std::runtime_error if it cannot be written
-void write_text(const std::filesystem::path& path, const std::string& text);
 
 }  // namespace softarm

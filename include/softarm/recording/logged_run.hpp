@@ -11,12 +11,13 @@
 #include "softarm/runtime/log_row.hpp"
 #include "softarm/simulation/simulated_operator.hpp"
 #include "softarm/transport/event_log.hpp"
+#include "softarm/transport/log_timeline.hpp"
 #include "softarm/transport/mocap_source.hpp"
 
 namespace softarm {
 
 /// Ticks at whole control periods from the first motion-capture frame of the log; frames arrive at
-/// their logged times. Commands are computed but not sent; measured pressures and a person who arms
+/// their times on LogTimeline. Commands are computed but not sent; measured pressures and a person who arms
 /// or holds a button are not needed (SimulatedOperator). Reads the log as it proceeds: memory does
 /// not grow with its length.
 class LoggedRun {
@@ -36,6 +37,9 @@ class LoggedRun {
   /// Messages on the motion-capture channel that could not be decoded.
   std::int64_t malformed() const { return malformed_; }
 
+  /// What was done to the clock of the logger.
+  const LogTimeline& timeline() const { return timeline_; }
+
   /// The log, for its damage; everything before and after damage was used.
   const EventLogReader& log() const { return log_; }
 
@@ -45,6 +49,7 @@ class LoggedRun {
   Experiment experiment_;
   ControlPipeline pipeline_;
   SimulatedOperator operator_;
+  LogTimeline timeline_;
   MocapSource mocap_;
   EventLogReader log_;
   std::vector<MocapFrame> frames_;

@@ -8,12 +8,19 @@
 #include <string>
 #include <vector>
 
+#include "softarm/base/output_file.hpp"
 #include "softarm/recording/csv_table.hpp"
 
 namespace softarm {
 
 /// The axis of the recording's world frame that points up. Ours is z.
 enum class UpAxis { x, y, z };
+
+/// What becomes of rows with the time of the row before.
+enum class EqualTimes { refuse, first, last };
+
+/// What becomes of a pressure that is no finite number.
+enum class MissingPressure { refuse, hold };
 
 /// Column indices of the pose of one rigid body.
 struct BodyColumns {
@@ -41,9 +48,12 @@ struct RecordingMap {
   std::optional<RestWindow> rest;
   Eigen::Matrix3d base_rotation =
       Eigen::Vector3d(1.0, -1.0, -1.0).asDiagonal();  ///< of S_0 at rest
-  std::optional<double> frame_period_s;  ///< given: frames that never came count as missing
-  std::vector<std::size_t> commanded;    ///< pressure columns, in chamber order
-  std::vector<std::size_t> measured;     ///< the same of measured pressures
+  std::optional<double> frame_period_s;         ///< given: frames that never came count as missing
+  std::vector<std::size_t> commanded;           ///< pressure columns, in chamber order
+  std::vector<std::size_t> measured;            ///< the same of measured pressures
+  EqualTimes equal_times = EqualTimes::refuse;  ///< else the first or the last of them counts
+  /// refuse, or hold the value of the row before
+  MissingPressure missing_pressure = MissingPressure::refuse;
   std::string mocap_channel;
   std::string command_channel;
   std::string measurement_channel;
@@ -51,6 +61,7 @@ struct RecordingMap {
 
 /// A table with the map of its columns; read together, because the map gives the separator.
 struct MappedTable {
+  Files files;  ///< both, and what the map includes
   RecordingMap map;
   CsvTable table;
 };

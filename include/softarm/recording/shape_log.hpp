@@ -3,11 +3,12 @@
 
 #include <Eigen/Core>
 #include <cstdint>
-#include <cstdio>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 
+#include "softarm/base/output_file.hpp"
 #include "softarm/config/experiment.hpp"
 #include "softarm/runtime/log_row.hpp"
 
@@ -17,23 +18,27 @@ namespace softarm {
 class ShapeLog {
  public:
   /// Removes the file of an earlier run from `folder`.
-  ShapeLog(const std::filesystem::path& folder, const Experiment& experiment);
+  /// @param inputs  files that are read beside the experiment's
+  /// @throws OutputIsInput
+  ShapeLog(const std::filesystem::path& folder, const Experiment& experiment,
+           const Files& inputs = {});
 
   /// Appends a row; rows without the plant's coordinates are ignored.
-  /// @throws std::runtime_error if the file cannot be made
+  /// @throws OutputError if the file cannot be made or written
   void add(const LogRow& row);
 
+  /// Flushes and closes. @throws OutputError if anything could not be written
+  void close();
+
  private:
-  struct Closer {
-    void operator()(std::FILE* file) const { std::fclose(file); }
-  };
   void open(Eigen::Index parts, std::size_t points);
 
   std::filesystem::path path_;
   std::string origin_;
   PlantSettings plant_;
   std::unique_ptr<PlantSystem> arm_;  // of plant_, made for the first row
-  std::unique_ptr<std::FILE, Closer> file_;
+  Files inputs_;
+  std::optional<OutputFile> file_;
   double next_s_ = 0.0;
   std::string line_;
 };

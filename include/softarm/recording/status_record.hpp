@@ -39,16 +39,20 @@ class TruthTrack {
 class StatusRecord {
  public:
   /// @param folder  for log.csv, summary.json and timing.json; empty: no files
-  /// @throws std::runtime_error if the folder or a file cannot be made
-  StatusRecord(const Experiment& experiment, const std::filesystem::path& folder);
+  /// @param inputs  files that are read beside the experiment's
+  /// @throws OutputIsInput, OutputError if the folder or a file cannot be made
+  StatusRecord(const Experiment& experiment, const std::filesystem::path& folder,
+               const Files& inputs = {});
 
   /// Takes a message of a channel of the configuration; other channels and other arms are ignored.
   /// Returns whether it was a status of this arm.
   bool take(std::string_view channel, std::span<const std::byte> bytes);
 
-  /// Writes the last rows and the files. @throws std::runtime_error if anything could not be
-  /// written
+  /// Writes the last rows and the files, as far as the disk lets it; failure() is what it did not.
   void close();
+
+  /// Why the record is not complete, as soon as that is known; empty: it is.
+  const std::string& failure() const { return failure_; }
 
   /// The summary at the end of a run, for a person.
   std::string table() const;
@@ -70,13 +74,17 @@ class StatusRecord {
   bool take_status(std::span<const std::byte> bytes);
   /// The rows that are complete, or all of them.
   void write_rows(bool all);
+  /// Does what writes to a file; afterwards failure() is why it could not.
+  template <class Write>
+  void try_to(const Write& write);
   std::string timing_text() const;
   std::string timing_table() const;
 
   const Experiment& experiment_;
-  std::filesystem::path folder_;
   TrackingSummary summary_;
   std::optional<ExperimentLog> log_;
+  std::optional<SummaryFiles> files_;
+  std::string failure_;
   TruthTrack truth_;
   std::deque<WaitingRow> waiting_;
   ArmStatus status_;

@@ -39,6 +39,7 @@ struct TickInput {
   const LiveReferenceInput* reference = nullptr;  ///< the newest, if one came
   OperatorRequests requests = {};
   bool command_expired = false;  ///< the last one sent has expired: the valves have vented
+  bool paused = false;           ///< the clock of `now_ns` stood still since the last tick
   int consecutive_overruns = 0;  ///< ticks missed in a row; zero where they are not to be judged
   /// Arrival of the newest pressure measurement, where the valves publish them.
   std::int64_t newest_measurement_ns = kNever;
@@ -46,6 +47,8 @@ struct TickInput {
   const PressureVector* measured_bar = nullptr;
   /// Arrival of the newest "go", where there is a dead-man input.
   std::int64_t newest_go_ns = kNever;
+  /// Arrival of the newest set points on our command channel that another program sent.
+  std::int64_t newest_foreign_ns = kNever;
 };
 
 /// What the tick saw, decided and commands.
@@ -56,9 +59,10 @@ struct TickOutput {
   bool saturated = false;     ///< a torque was out of the chambers' reach and was scaled down
   bool slew_limited = false;  ///< a pressure could not move as fast as asked
   bool reference_limited =
-      false;                ///< the reference was bent, or a live one refused, by a soft limit
-  bool soft_limit = false;  ///< the arm is beyond max_theta_rad or max_speed_radps
-  bool bounded = false;     ///< the controller bounded something near a singularity
+      false;                    ///< the reference was bent, or a live one refused, by a soft limit
+  bool soft_limit = false;      ///< the arm is beyond max_theta_rad or max_speed_radps
+  bool bounded = false;         ///< the controller bounded something near a singularity
+  bool length_warning = false;  ///< a segment is not as long as configured
   std::int64_t frame_number = -1;  ///< newest accepted frame
   /// Why the newest frame was refused; `accepted` where it was not.
   FrameVerdict refusal = FrameVerdict::accepted;
@@ -133,6 +137,8 @@ class ControlPipeline {
   CommandMoves command_moves_;
   FramePeriodWatch frame_period_watch_;
   CurvatureWatch curvature_watch_;
+  OscillationWatch oscillation_watch_;
+  LengthWatch length_watch_;
 
   TickOutput output_;
   ReferenceWindow window_;

@@ -1,13 +1,16 @@
-// Checks that the arm follows its commands: measured against commanded pressures, curvature against
-// pressures.
+// Checks that the arm follows its commands and is the one configured: measured against commanded
+// pressures, curvature against pressures and against the reference, measured against configured
+// lengths.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
 
 #include "softarm/actuation/pressure_allocator.hpp"
 #include "softarm/base/time.hpp"
+#include "softarm/estimation/curvature_estimator.hpp"
 #include "softarm/model/arm.hpp"
 #include "softarm/model/dynamics.hpp"
 #include "softarm/runtime/settings.hpp"
@@ -140,6 +143,86 @@ class CurvatureWatch {
   std::int64_t since_ns_ = 0;
   bool beyond_ = false;
   bool strays_ = false;
+};
+
+/// A loop that is unstable: the error u_ref - u of some coordinate oscillates and does not fade.
+/// Errors and reference pass the same high-pass filter (two poles at `oscillation_lowest_hz`). An
+/// extremum counts where the error has changed sign since the last one, no longer ago than half a
+/// period of the lowest frequency, by at least `oscillation_rad`, by at least `oscillation_part` of
+/// what the reference did meanwhile (what follows the reference, well or badly, is no oscillation),
+/// and by at least 0.7 of the first one in a row (what fades is none either). No allocation, no
+/// clock; bounded: it is found within `oscillation_periods` periods.
+class OscillationWatch {
+ public:
+  /// Of `dof` coordinates that are judged every `period_s`.
+  OscillationWatch(const SafetySettings& settings, double period_s, int dof);
+
+  /// The next tick under control: where the arm should be and where it is, `dof` each, rad.
+  void judge(ConstVectorRef reference_rad, ConstVectorRef u_rad) noexcept;
+
+  /// Some coordinate oscillated for so many periods.
+  bool oscillates() const noexcept { return oscillates_; }
+  /// Starts again, where the arm was not under control.
+  void reset() noexcept;
+
+ private:
+  class HighPass {
+   public:
+    double pass(double value, double share) noexcept;
+
+   private:
+    double slow_ = 0.0, slower_ = 0.0;
+    bool started_ = false;
+  };
+  struct Coordinate {
+    HighPass error, reference;
+    double extremum = 0.0, first_extremum = 0.0;
+    double reference_extremum = 0.0, last_reference_extremum = 0.0;
+    int ticks = 0;         ///< since the error changed sign
+    int half_periods = 0;  ///< in a row
+  };
+
+  void judge(Coordinate& it, double error_rad, double reference_rad) noexcept;
+  void end_half_period(Coordinate& it) noexcept;
+
+  double amplitude_rad_, part_, share_;
+  int longest_ticks_, half_periods_;
+  std::vector<Coordinate> coordinates_;
+  bool oscillates_ = false;
+};
+
+/// The controller's model has segments of constant length. A measured length that is another one for
+/// long means an arm that stretches, a marker frame that slipped or a wrong number in the
+/// configuration: the tip is then not where it is reported. No allocation, no clock.
+class LengthWatch {
+ public:
+  LengthWatch(const SafetySettings& settings, const ArmParameters& arm);
+
+  /// The lengths of an accepted frame. A length whose standard deviation is above a third of a limit
+  /// is no evidence for or against it.
+  void judge(std::int64_t capture_ns, const CurvatureEstimate& estimate) noexcept;
+
+  /// Some segment's length was off by more than the warning throughout the settling time.
+  bool warns() const noexcept { return warning_.exceeded; }
+  /// The same of the fault.
+  bool out_of_tolerance() const noexcept { return fault_.exceeded; }
+  /// Some segment's length was off by more than the fault when it was last measured.
+  bool beyond() const noexcept { return fault_.beyond; }
+  /// Starts again, for a gap in which anything may have happened.
+  void reset() noexcept;
+
+ private:
+  struct Limit {
+    double relative;  ///< 0: none
+    bool exceeded = false;
+    bool beyond = false;
+    std::array<std::int64_t, kMaxSegments> since_ns{};  ///< kNever while within the limit
+  };
+  void judge(std::int64_t capture_ns, const CurvatureEstimate& estimate, Limit& limit) noexcept;
+
+  std::vector<double> length_m_;
+  std::int64_t settling_ns_;
+  Limit warning_, fault_;
 };
 
 }  // namespace softarm

@@ -44,8 +44,11 @@ enum class Reason : std::int8_t {
   pressure_mismatch,
   curvature_mismatch,
   command_expired,
+  oscillation,
+  length_mismatch,
+  foreign_commands,
+  requests_lost,
   frames_refused,  ///< frames_late or frames_stale, where frames come but are refused
-
   frame_period_mismatch,
   activated_too_often
 };
@@ -80,9 +83,11 @@ struct SafetyThresholds {
   std::int64_t vent_after_ns;  ///< frame age, or gap between ticks, that vents
   std::int64_t valve_silence_ns;
   std::int64_t deadman_timeout_ns;
+  std::int64_t arm_lapses_ns;  ///< an `arm` that has not led to ACTIVE by then is taken back
 };
 /// Times given in the settings (s); where zero, derived from control and frame period T and T_f: HOLD
-/// after max(3 T, 3 T_f + latency), VENT after max(0.1 s, 10 T_f, 3 T).
+/// after max(3 T, 3 T_f + latency), VENT after max(0.1 s, 10 T_f, 3 T). An `arm` lapses after 2 s plus
+/// the time of twice the good frames needed.
 SafetyThresholds resolve_thresholds(const SafetySettings& settings,
                                     double control_period_s) noexcept;
 
@@ -92,6 +97,7 @@ struct OperatorRequests {
   bool disarm = false;
   bool emergency_stop = false;
   bool shutdown = false;  ///< from now on: vent, and nothing else
+  bool lost = false;      ///< some may have been lost: a disarm or an emergency stop too
 };
 
 /// Inputs of the monitor in one tick. Times are of one monotonic clock, in ns.
@@ -112,9 +118,13 @@ struct SafetyInput {
   std::int64_t newest_measurement_ns = kNever;  ///< of the valves' read-back
   bool pressure_mismatch = false;               ///< measured pressures do not follow the commands
   bool curvature_mismatch = false;              ///< the arm is not where its pressures would put it
+  bool oscillation = false;            ///< the arm swings about its reference and does not stop
+  bool length_mismatch = false;        ///< the arm is not as long as configured
+  bool paused = false;                 ///< the clock stood still since the last tick
   bool command_expired = false;        ///< the last command expired: the valves have vented
   bool deadman_used = false;           ///< there is a dead-man input
   std::int64_t newest_go_ns = kNever;  ///< arrival of the newest "go"
+  std::int64_t newest_foreign_ns = kNever;  ///< of the newest command that another program sent
   OperatorRequests requests = {};
 };
 
@@ -146,6 +156,7 @@ class SafetyMonitor {
  private:
   void note_stop(const SafetyInput& input) noexcept;
   CauseRule worst_cause(const SafetyInput& input) const noexcept;
+  bool under_control() const noexcept { return mode_ == Mode::active || mode_ == Mode::hold; }
   void take_operator_requests(const SafetyInput& input, Mode demanded) noexcept;
   void enter(const CauseRule& cause) noexcept;
   void try_to_activate(const SafetyInput& input, Reason otherwise) noexcept;
@@ -155,6 +166,7 @@ class SafetyMonitor {
   Mode mode_ = Mode::init;
   Reason reason_ = Reason::starting;
   bool armed_;
+  std::int64_t arm_pending_since_ns_ = kNever;  ///< of an `arm` that has not led to ACTIVE yet
   int good_in_a_row_ = 0;
   std::int64_t previous_tick_ns_ = 0;
   std::int64_t listening_since_ns_ = kNever;  ///< end of the last stop, for the valves

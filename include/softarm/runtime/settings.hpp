@@ -34,6 +34,13 @@ struct SafetySettings {
   double pressure_settling_s = 0.3;
   double curvature_residual_nm = 0.0;
   double curvature_settling_s = 0.5;
+  double oscillation_rad = 0.05;
+  int oscillation_periods = 4;
+  double oscillation_lowest_hz = 0.5;
+  double oscillation_part = 0.5;
+  double length_warning = 0.05;
+  double length_fault = 0.1;
+  double length_settling_s = 0.5;
   bool deadman = false;  ///< there is a dead-man input
   double deadman_timeout_s = 0.2;
   /// How long a command is valid: the valve side vents by itself unless a newer one arrives.

@@ -10,8 +10,9 @@ namespace softarm {
 
 class Valves;
 
-/// The generalized force A_chamber tau_A of every segment (2n, N m), decaying exponentially from
-/// one value to another as pressures behind valves do.
+/// The generalized force A_chamber tau_A of every segment (2n, N m; 3n with the axial forces in N
+/// where segments stretch), decaying exponentially from one value to another as pressures behind
+/// valves do.
 class ActuatorInput {
  public:
   using ConstVector = SecondOrderSystem::ConstVector;
@@ -46,7 +47,7 @@ class ActuatorInput {
     return force_nm_;
   }
 
-  /// tau_A of segment i: the moments about its x and y axes.
+  /// tau_A of segment i of an arm that does not stretch: the moments about its x and y axes.
   Eigen::Vector2d tau_nm(double t_s, Eigen::Index i) {
     const Eigen::VectorXd& force = force_nm(t_s);
     return {-force[2 * i + 1], force[2 * i]};

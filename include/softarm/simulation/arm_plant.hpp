@@ -24,7 +24,8 @@ struct PlantEnergies {
   double dissipated = 0.0;  ///< by damping since the start; 0 unless `account_energy`
 };
 
-/// One simulated arm with its valves, at rest in `initial_u_rad` at t = 0 with no pressure.
+/// One simulated arm with its valves, at rest in `initial_u_rad` at t = 0 with no pressure, segments
+/// that stretch at their length at rest.
 ///
 /// Commands may change at any time: the integrator is a one-step method and the pressure behind a
 /// valve is known in closed form while a command is held, so neither a step in the command nor one
@@ -60,7 +61,7 @@ class ArmPlant {
 
   /// Puts the arm into another state (u in rad, velocity in rad/s, 2n each; pressures in bar),
   /// spread over the parts of the segments as in `PlantSettings::initial_u_rad`,
-  /// keeping the time; `supplied` and `dissipated` count from here. @throw std::invalid_argument
+  /// without elongation, keeping the time; `supplied` and `dissipated` count from here. @throw std::invalid_argument
   /// for sizes or numbers that are wrong.
   void reset(ConstVectorRef u_rad, ConstVectorRef velocity_radps,
              std::span<const double> pressure_bar);
@@ -74,8 +75,9 @@ class ArmPlant {
   SegmentVector u_rad() const noexcept;
   SegmentVector velocity_radps() const noexcept;
 
-  /// The coordinates of the kind at hand and their rates, `dof()` each: u of every segment (pcc) or
-  /// piece (refined), or the angles about x and y of every joint (links), base to tip; rad, rad/s.
+  /// The coordinates of the kind at hand and their rates, `dof()` each: u of every segment (pcc;
+  /// where segments stretch [u_x, u_y, e] with e in m) or piece (refined), or the angles about x and
+  /// y of every joint (links), base to tip; rad, rad/s.
   Eigen::VectorXd coordinates() const noexcept;
   Eigen::VectorXd coordinate_rates() const noexcept;
 

@@ -31,7 +31,9 @@ struct PlantShape {
 /// ignored in silence.
 class PlantSystem : public SecondOrderSystem {
  public:
-  explicit PlantSystem(const PlantSettings& settings);
+  /// @param stretches whether the kind simulates an arm that is `extensible`.
+  /// @throw std::invalid_argument for such an arm where it does not.
+  explicit PlantSystem(const PlantSettings& settings, bool stretches = false);
 
   /// Of gravity (zero at the world's origin) and bending.
   virtual double potential_energy_j(ConstVector x) = 0;
@@ -51,8 +53,7 @@ class PlantSystem : public SecondOrderSystem {
   /// Of the PCC arm of these u.
   virtual PlantShape shape(ConstVector x) const;
 
-  /// From t_s on the actuators make the generalized force (A_chamber tau_A of every segment, 2n,
-  /// N m) target + (present - target) exp(-(t - t_s) / lag_s); lag 0: target.
+  /// From t_s on the actuators make the generalized force (`ActuatorInput`) target + (present - target) exp(-(t - t_s) / lag_s); lag 0: target.
   void drive(double t_s, ConstVector present_nm, ConstVector target_nm, double lag_s) {
     input_.drive(t_s, present_nm, target_nm, lag_s);
   }
@@ -61,7 +62,7 @@ class PlantSystem : public SecondOrderSystem {
   const ExternalLoads& external_loads() const { return external_loads_; }
 
  protected:
-  /// The shape of constant-curvature arcs, u of each.
+  /// The shape of constant-curvature arcs, u of each, or (u, e) where they stretch.
   static PlantShape arcs(const ArmParameters& arm, ConstVector u);
 
   ActuatorInput input_;

@@ -24,6 +24,12 @@ class SecondOrderSystem {
   virtual ~SecondOrderSystem() = default;
 
   virtual int size() const = 0;
+  /// The change of coordinate i (and, a second, of its rate) that matters as much as one radian:
+  /// what the absolute tolerances are multiplied by.
+  virtual double unit(Eigen::Index i) const {
+    (void)i;
+    return 1.0;
+  }
 
   /// out = r(t, x, v, a).
   virtual void residual(double t_s, ConstVector x, ConstVector v, ConstVector a, Vector out) = 0;

@@ -22,7 +22,8 @@ struct ArmStatus {
   std::int64_t frame_number = 0;  ///< of the newest frame used
   std::uint64_t configuration_hash = 0;
   std::uint64_t seed = 0;
-  std::string version;  ///< release and commit
+  std::int64_t nonce = 0;  ///< to be echoed by requests
+  std::string version;     ///< release and commit
   Mode mode = Mode::init;
   Reason reason = Reason::starting;  ///< why the mode is not ACTIVE
 
@@ -33,7 +34,8 @@ struct ArmStatus {
   bool reference_limited =
       false;  ///< a soft limit changed the reference, or a live reference was refused
   bool soft_limit = false;
-  bool bounded = false;  ///< the controller limited a term near a singularity
+  bool bounded = false;         ///< the controller limited a term near a singularity
+  bool length_warning = false;  ///< a segment is measured longer or shorter than configured
 
   double frame_age_s = std::numeric_limits<double>::quiet_NaN();
   std::int64_t frames_accepted = 0;

@@ -6,16 +6,21 @@
 #include <softarm_messages/curvature_reference_t.hpp>
 #include <softarm_messages/deadman_t.hpp>
 #include <softarm_messages/operator_command_t.hpp>
+#include <softarm_messages/pressure_command_t.hpp>
 #include <softarm_messages/pressure_measurement_t.hpp>
 #include <softarm_messages/timing_t.hpp>
+#include <softarm_messages/torque_command_t.hpp>
 #include <vector>
 
+#include "softarm/base/clock.hpp"
 #include "softarm/base/histogram.hpp"
 #include "softarm/runtime/control_pipeline.hpp"
 #include "softarm/runtime/settings.hpp"
 #include "softarm/transport/lcm_node.hpp"
 #include "softarm/transport/mocap_source.hpp"
+#include "softarm/transport/nonce.hpp"
 #include "softarm/transport/output_messages.hpp"
+#include "softarm/transport/sent_commands.hpp"
 #include "softarm/transport/settings.hpp"
 #include "softarm/transport/tick_record.hpp"
 
@@ -33,6 +38,10 @@ struct LoopTiming {
 
 /// Collects the inputs of a tick and publishes its outputs. Use from the thread of the tick. After
 /// construction nothing allocates, waits or throws.
+///
+/// Who may ask for what (docs/reference/requests.md): a request that vents is obeyed whatever else
+/// the message says. An `arm`, a "go", and a disarm that leaves FAULT must echo the nonce of a recent
+/// status, and an `arm` must be younger than every disarm and emergency stop.
 class DaemonLink {
  public:
   /// @param shadow  mark commands as computed for inspection only
@@ -61,6 +70,12 @@ class DaemonLink {
   /// a run, when no tick follows.
   bool repeat_record() noexcept;
 
+  /// Nonce of the status of this instant.
+  std::int64_t nonce(std::int64_t now_ns) const noexcept { return nonces_.at(now_ns / 1000); }
+  /// How long the valves hold a command of ours (us): its validity, or less where they grant less.
+  std::int32_t held_us() const noexcept;
+  /// The validity that commands ask for (us).
+  std::int32_t asked_us() const noexcept { return messages_.pressure_command.validity_us; }
   /// Messages that could not be decoded.
   std::int64_t malformed() const noexcept { return malformed_; }
   /// Measurements older by their sender's clock than the one before: two senders, or a restart.
@@ -75,7 +90,10 @@ class DaemonLink {
   void take_reference(const ReceivedMessage& packet) noexcept;
   void take_operator(const ReceivedMessage& packet) noexcept;
   void take_measurement(const ReceivedMessage& packet) noexcept;
+  void take_valves_report() noexcept;
   void take_go(const ReceivedMessage& packet) noexcept;
+  void take_command(const ReceivedMessage& packet) noexcept;
+  bool requests_lost(std::int64_t previous_ns) noexcept;
   std::int64_t arrival_ns(const ReceivedMessage& packet) const noexcept;
   bool command_expired(std::int64_t now_us) const noexcept;
 
@@ -97,11 +115,33 @@ class DaemonLink {
   std::int64_t go_sequence_;
   PressureVector measured_bar_;
   std::int64_t newest_reference_ns_ = kNever;
-  std::int64_t newest_operator_ns_ = kNever;
   std::int64_t reference_sequence_;
-  std::int64_t operator_sequence_;
+  std::int64_t newest_foreign_ns_ = kNever;
+  int requests_ = 0, goes_ = 0;  ///< since the last tick
+  bool released_ = false;        ///< the dead-man input, since the last tick
+
+  // What an `arm` must be younger than.
+  NonceClock nonces_;
+  Mode mode_ = Mode::init;           ///< of the newest status
+  std::int64_t vented_us_ = kNever;  ///< a disarm, a stop, or the beginning of VENT or FAULT
+  std::int64_t fault_us_ = kNever;   ///< the newest emergency stop, or the beginning of FAULT
+  std::int64_t newest_request_ns_ = kNever;
+  std::int64_t newest_sequence_ = kNever;   ///< of all requests
+  std::int64_t refused_ns_ = kNever;        ///< the newest disarm or stop
+  std::int64_t refused_sequence_ = kNever;  ///< up to this number an `arm` is older than that
+
+  std::int64_t stopped_ns_ = kNever;  ///< end of the last stop of this process
+  std::int64_t dropped_ = 0;          ///< packets by the socket
+  SentCommands sent_;
   std::int64_t commands_ = 0;
   std::int64_t sent_us_ = kNever;  ///< time in the newest command
+  PauseWatch pause_;
+  bool paused_while_deciding_ = false;
+  bool valve_readback_ = false;
+  // What the valves have reported.
+  bool valves_vented_ = false;
+  std::int32_t valves_expired_ = 0, granted_us_ = 0;
+  std::int64_t valves_heard_ns_ = kNever;
   std::int64_t malformed_ = 0;
   std::int64_t measurement_time_us_ = kNever;
   std::int64_t backward_measurements_ = 0, backward_references_ = 0;
@@ -111,6 +151,8 @@ class DaemonLink {
   softarm_messages::operator_command_t operator_message_;
   softarm_messages::pressure_measurement_t measurement_message_;
   softarm_messages::deadman_t deadman_message_;
+  softarm_messages::pressure_command_t heard_pressures_;
+  softarm_messages::torque_command_t heard_torques_;
   softarm_messages::timing_t timing_message_;
 };
 

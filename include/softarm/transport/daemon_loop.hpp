@@ -25,6 +25,9 @@ class DaemonLoop {
   DaemonLoop(const PipelineSettings& settings, const TransportSettings& transport,
              const Provenance& provenance, bool shadow);
 
+  /// The first tick will find an emergency stop: a FAULT that nobody has acknowledged.
+  void begin_stopped() noexcept { begin_stopped_ = true; }
+
   /// Ticks until `stop_requested` returns true and every pressure has been commanded to zero.
   /// Neither allocates nor throws as long as the callbacks do not.
   void run(const std::function<bool()>& stop_requested,
@@ -44,6 +47,7 @@ class DaemonLoop {
   DaemonLink link_;
   std::int64_t ticks_per_second_;
   bool judge_overruns_ = false;
+  bool begin_stopped_ = false;
   int missed_in_row_ = 0;
   LoopTiming timing_;
 };

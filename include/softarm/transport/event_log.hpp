@@ -15,6 +15,7 @@
 #include <string_view>
 #include <vector>
 
+#include "softarm/base/output_file.hpp"
 #include "softarm/base/time.hpp"
 
 namespace softarm {
@@ -92,25 +93,27 @@ class EventLogReader {
 /// Writes a log for lcm-logplayer and EventLogReader. Events are numbered from 0.
 class EventLogWriter {
  public:
-  /// Overwrites an existing file. @throws std::runtime_error if it cannot be opened
-  explicit EventLogWriter(const std::filesystem::path& file);
+  /// Replaces an existing file at the end. @param inputs  files that are read
+  /// @param kind  record: what was written is kept, even without close()
+  /// @throws OutputIsInput, OutputError if it cannot be opened
+  explicit EventLogWriter(const std::filesystem::path& file, const Files& inputs = {},
+                          OutputFile::Kind kind = OutputFile::Kind::record)
+      : file_(file, inputs, kind) {}
 
   /// Appends an event.
   /// @param time_us  arrival on the wall clock, as in the logs of lcm-logger
   /// @param channel  1 to EventLogReader::kLargestChannel bytes
   /// @param data  up to EventLogReader::kLargestData bytes
-  /// @throws std::invalid_argument for other sizes; std::runtime_error if the file could not be
-  /// written
+  /// @throws std::invalid_argument for other sizes; OutputError if the file could not be written,
+  /// which then ends with the last whole event
   void write(std::int64_t time_us, std::string_view channel, std::span<const std::byte> data);
 
-  /// Ends the log; the file is complete afterwards. @throws std::runtime_error if it is not
-  void close();
+  /// Ends the log; the file is complete afterwards. @throws OutputError if it is not
+  void close() { file_.commit(); }
 
  private:
-  void check();
-
-  std::filesystem::path path_;
-  std::ofstream file_;
+  OutputFile file_;
+  std::string event_;
   std::int64_t number_ = 0;
 };
 

@@ -51,6 +51,10 @@ class LcmNode {
   /// Handles the messages that have arrived, at most `limit`, without waiting. Returns how many.
   int drain(int limit) noexcept;
 
+  /// Packets that the receiving socket has dropped so far, of all channels of the network; 0 where it
+  /// cannot be read.
+  std::int64_t dropped() const noexcept;
+
   /// Waits for a message until `deadline_ns` of CLOCK_MONOTONIC and handles it. Returns whether
   /// there was one; also false if a signal interrupted the wait.
   bool wait_until(std::int64_t deadline_ns) noexcept;
@@ -77,6 +81,7 @@ class LcmNode {
   static void dispatch(const _lcm_recv_buf_t* packet, const char* channel, void* user) noexcept;
 
   _lcm_t* lcm_ = nullptr;
+  int socket_ = -1;  ///< LCM's, that receives
   ArrivalClock arrivals_;
   std::deque<Subscription> subscriptions_;  // stable addresses: LCM keeps a pointer to each
   std::vector<std::byte> buffer_;
@@ -85,5 +90,12 @@ class LcmNode {
 /// The InstanceLock name of a channel. Neither the options after the '?' of a URL nor another
 /// spelling of group and port make it a different network.
 std::string lock_name(const std::string& channel, const std::string& url);
+
+/// Whether LCM_DEFAULT_URL names another network than `url`, for a person; empty: it does not.
+/// softarm does not follow the variable, lcm-logger and lcm-spy do.
+std::string network_warning(const std::string& url);
+/// Whether messages sent to `url` stay on this machine, where all read the same monotonic clock:
+/// UDP multicast whose ttl is 0, LCM's default.
+bool is_local(const std::string& url);
 
 }  // namespace softarm

@@ -32,7 +32,7 @@ class ValvesLink {
   /// second. Returns whether they have changed.
   bool publish_status(std::int64_t now_ns, std::int64_t late_cycles) noexcept;
 
-  /// Commands that were malformed or for another arm.
+  /// Commands that were malformed, for another arm, or, on one machine, not of this moment.
   std::int64_t refused() const noexcept { return refused_; }
 
  private:
@@ -42,6 +42,7 @@ class ValvesLink {
   ValveDriver& driver_;
   LcmNode node_;
   std::vector<double> pressure_bar_;
+  bool local_;  ///< senders read our monotonic clock
   bool discarding_ = false;
   std::int64_t refused_ = 0;
   std::int64_t next_status_ns_ = 0;

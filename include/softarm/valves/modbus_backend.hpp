@@ -21,6 +21,7 @@ class ModbusBackend : public ValveBackend {
   void close() noexcept override { terminal_.close(); }
   bool is_open() const noexcept override { return terminal_.is_open(); }
   Secured secure() noexcept override;
+  Secured check() noexcept override;
   LinkResult write(const Eigen::VectorXd& set_points_bar) noexcept override;
   LinkResult read(ReadBack& read_back) noexcept override;
   const char* error() const noexcept override;
@@ -30,11 +31,15 @@ class ModbusBackend : public ValveBackend {
   std::string warning() const override;
 
  private:
+  /// Keeps why the time-out is not what was set.
+  void refuse(const char* what) noexcept;
+
   ValveDriverSettings settings_;
   double max_pressure_bar_;
   ModbusTerminal terminal_;
   std::vector<std::uint16_t> out_, in_;
-  std::array<char, 200> refusal_{};  ///< of the time-out; "": report the terminal's error
+  std::array<std::uint16_t, 2> timeout_{};  ///< words of the fail-safe time-out
+  std::array<char, 200> refusal_{};         ///< of the time-out; "": report the terminal's error
 };
 
 }  // namespace softarm

@@ -56,6 +56,7 @@ struct ValveDriverSettings {
   double backoff_s = 0.1;
   double longest_backoff_s = 5.0;
   double failsafe_timeout_s = 0.2;
+  double vented_bar = 0.1;
   double stuck_bar = 0.3;
   double stuck_after_s = 1.0;
   bool stuck_vents = true;

@@ -12,8 +12,8 @@
 namespace softarm {
 
 /// Behaves as documented, including the hazards: a negative set point fully opens the valve. Set
-/// points reset to zero when no request arrives within the time-out set by the driver (0, as after
-/// power-up: never).
+/// points reset to zero when nothing is written within the time-out set by the driver (0, as after
+/// power-up: never); clients that only read do not keep them.
 class SimulatedTerminal : public RegisterBank {
  public:
   /// `order`: the valve of every chamber, from 0.
@@ -26,8 +26,8 @@ class SimulatedTerminal : public RegisterBank {
   bool writable(int address, int count) const noexcept override;
   void served(int address, int count) noexcept override;
 
-  /// Whether any request was served since the last call.
-  bool take_served() noexcept;
+  /// Whether anything was written since the last call.
+  bool take_written() noexcept;
   /// Sets the sensors: one pressure per chamber (bar), then the status that the terminal reports.
   void measure(const Eigen::VectorXd& actual_bar) noexcept;
   /// Set points as the valves take them (bar, one per chamber); slots that do not regulate give 0.
@@ -47,7 +47,7 @@ class SimulatedTerminal : public RegisterBank {
   std::vector<int> order_;
   std::vector<std::uint16_t> registers_;
   Eigen::VectorXd set_points_bar_;
-  bool served_ = false;
+  bool written_ = false;
 };
 
 }  // namespace softarm

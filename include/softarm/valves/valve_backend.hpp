@@ -65,6 +65,15 @@ class ValveBackend {
   /// time-out cannot be driven.
   virtual Secured secure() noexcept = 0;
 
+  /// Reads that time-out back, about once a second: another master may have changed it. Hardware
+  /// whose time-out nobody else can change needs no override.
+  virtual Secured check() noexcept { return {LinkResult::ok, true}; }
+
+  /// Whether `read` returns the answer to the last `write`. Otherwise it asks the hardware, and what
+  /// it holds is known before every write.
+  virtual bool answers_writes() const noexcept { return false; }
+
+  /// Called once a cycle, after `read` except in the first cycle.
   /// @param set_points_bar each in [0, max_pressure_bar]
   virtual LinkResult write(const Eigen::VectorXd& set_points_bar) noexcept = 0;
   /// Fills `read_back`, which is unspecified unless ok. A value that is not finite counts as no

@@ -27,7 +27,7 @@ class ValveDriver {
               std::function<std::int64_t()> clock = monotonic_now_ns);
 
   /// False: queued commands are too old and must be discarded (ValveGuard::wake).
-  bool wake(std::int64_t now_ns) noexcept { return guard_.wake(now_ns); }
+  bool wake(std::int64_t now_ns) noexcept { return guard_.wake(now_ns, pause_.paused()); }
   /// A command that arrived at `arrival_ns`, by the rules of CommandExpiry.
   CommandVerdict command(const PressureCommand& command, std::int64_t arrival_ns) noexcept {
     return guard_.command(command, arrival_ns);
@@ -60,6 +60,8 @@ class ValveDriver {
 
  private:
   bool exchange(std::int64_t now_ns) noexcept;
+  bool read(std::int64_t now_ns) noexcept;
+  void give_up() noexcept;
   void keep_error() noexcept;
 
   std::unique_ptr<ValveBackend> backend_;
@@ -67,12 +69,13 @@ class ValveDriver {
   std::vector<int> order_;
   std::string address_;
   ValveGuard guard_;
+  PauseWatch pause_;
   ReadBack read_back_, newest_;
   Eigen::VectorXd written_bar_, zero_;
   std::int64_t sequence_ = CommandExpiry::kNoSequence;
   std::int64_t stop_ns_ = 0;
   bool stopping_ = false;
-  bool exchanged_since_stop_ = false;
+  std::int64_t cycles_at_stop_ = 0;
   std::array<char, 200> error_{};  ///< of the request that failed last
 };
 

@@ -40,6 +40,8 @@ int serve(const std::string& path, const std::string& sensor_suffix,
       "softarm-plant {} commit {} configuration {} seed {}: {}, motion capture at {} Hz\n",
       version_text(), commit_text(), hash_text(experiment.hash), experiment.seed, experiment.name,
       experiment.plant.mocap.rate_hz));
+  if (const std::string warning = network_warning(lcm.url); !warning.empty())
+    say(fmt::format("softarm-plant: warning: {}\n", warning));
   PlantProcess(experiment, modbus_port).run();
   return kExitOk;
 }

@@ -11,6 +11,7 @@
 #include "softarm/base/clock.hpp"
 #include "softarm/base/time.hpp"
 #include "softarm/transport/message_decoding.hpp"
+#include "softarm/valves/valve_guard.hpp"
 
 namespace softarm {
 namespace {
@@ -26,9 +27,8 @@ PlantProcess::PlantProcess(const Experiment& experiment, std::optional<int> modb
     : lcm_(experiment.transport.lcm),
       mocap_(experiment.transport, experiment.plant.arm),
       node_(lcm_.url),
-      // Registers hold until the terminal's own time-out, or without limit if it has none.
-      arm_(experiment.plant, monotonic_now_ns(),
-           modbus_port ? kForever : to_ns(experiment.safety.command_validity_s)),
+      arm_(experiment.plant, monotonic_now_ns()),
+      local_(is_local(lcm_.url)),
       by_torque_(experiment.plant.actuation.kind == ActuationKind::torque),
       report_period_ns_(to_ns(1.0 / experiment.plant.mocap.rate_hz)) {
   if (modbus_port) {
@@ -37,6 +37,10 @@ PlantProcess::PlantProcess(const Experiment& experiment, std::optional<int> modb
                     modbus_->server.port()));
     return;
   }
+  valve_side_.emplace(experiment.plant.actuation, to_ns(experiment.safety.command_validity_s));
+  set_points_ = valve_side_->set_points();
+  measurement_message_.validity_us =
+      static_cast<std::int32_t>(valve_side_->commands().longest_ns() / 1000);
   // No exception may pass through LCM, so the handler only takes the message; the loop acts on
   // it.
   node_.subscribe(lcm_.command_channel, kCommandCapacity, [this](const ReceivedMessage& packet) {
@@ -48,7 +52,9 @@ PlantProcess::PlantProcess(const Experiment& experiment, std::optional<int> modb
 void PlantProcess::run() {
   std::int64_t next_report_ns = arm_.time_ns();
   while (stop_requested == 0) {
-    const std::int64_t deadline_ns = std::min(next_report_ns, arm_.next_event_ns()) + lost_ns_;
+    const std::int64_t valves_ns = valve_side_ ? valve_side_->next_event_ns() : kForever;
+    const std::int64_t deadline_ns =
+        std::min({next_report_ns, arm_.next_event_ns(), valves_ns}) + lost_ns_;
     modbus_ ? serve_requests(deadline_ns) : take_commands(deadline_ns);
     advance();
     for (MocapFrame frame; arm_.receive(frame);) {
@@ -71,14 +77,14 @@ void PlantProcess::take_commands(std::int64_t deadline_ns) {
   } while (++taken < kCommandCapacity && node_.drain(1) > 0);
 }
 
-/// Written set points hold until the terminal's time-out, counted from the last request.
+/// Written set points hold until the terminal's time-out, counted from the last write.
 void PlantProcess::serve_requests(std::int64_t deadline_ns) {
   if (!modbus_->server.wait_until(deadline_ns)) return;
   advance();
   SimulatedTerminal& terminal = modbus_->terminal;
   terminal.measure(arm_.measured_pressures_bar());
   modbus_->server.serve(terminal);
-  if (!terminal.take_served()) return;
+  if (!terminal.take_written()) return;
   const Eigen::VectorXd& bar = terminal.set_points_bar();
   const double timeout_s = terminal.timeout_s();
   arm_.command({.sequence = modbus_->sequence++,
@@ -99,11 +105,28 @@ std::int64_t PlantProcess::arm_now_ns() {
 }
 
 void PlantProcess::advance() {
-  const bool was_vented = arm_.vented();
-  arm_.advance_to(arm_now_ns());
-  if (!arm_.vented() || was_vented) return;
+  const bool was_vented = vented();
+  const std::int64_t now_ns = arm_now_ns();
+  if (valve_side_) advance_valve_side(now_ns);
+  arm_.advance_to(now_ns);
+  if (!vented() || was_vented) return;
   say("softarm-plant: commands have stopped; vented\n");
   if (modbus_) modbus_->terminal.reset_outputs();
+}
+
+void PlantProcess::advance_valve_side(std::int64_t now_ns) {
+  if (pause_.paused()) valve_side_->pause();
+  const auto follow_at = [&](std::int64_t time_ns) {
+    valve_side_->update(time_ns);
+    if (valve_side_->set_points() == set_points_) return;
+    set_points_ = valve_side_->set_points();
+    arm_.command(PressureVector(set_points_), kForever, time_ns);
+  };
+  while (valve_side_->next_event_ns() < now_ns) follow_at(valve_side_->next_event_ns());
+  follow_at(now_ns);
+  const bool degraded = valve_side_->degraded(now_ns);
+  if (degraded && !degraded_) say("softarm-plant: DEGRADED (another sender): vented\n");
+  degraded_ = degraded;
 }
 
 void PlantProcess::take_command() {
@@ -113,23 +136,38 @@ void PlantProcess::take_command() {
 
 template <class Message, class Values>
 void PlantProcess::take_command(const Message& message, const Values& values) {
+  if (local_ && is_untimely(message.time_us, message.validity_us, monotonic_now_ns() / 1000))
+    return;
   pressure_bar_.assign(values.begin(), values.end());
-  const bool was_vented = arm_.vented();
-  const CommandVerdict verdict =
-      arm_.command({.sequence = message.sequence,
-                    .validity_ns = std::int64_t{message.validity_us} * 1000,
-                    .shadow = message.shadow != 0,
-                    .pressure_bar = pressure_bar_},
-                   arm_now_ns());
-  if (was_vented && verdict == CommandVerdict::in_force)
-    say("softarm-plant: commands have begun\n");
+  advance();
+  const bool was_vented = vented();
+  valve_side_->receive({.sequence = message.sequence,
+                        .validity_ns = std::int64_t{message.validity_us} * 1000,
+                        .sent_us = message.time_us,
+                        .shadow = message.shadow != 0,
+                        .pressure_bar = pressure_bar_},
+                       arm_now_ns());
+  if (was_vented && !vented()) say("softarm-plant: commands have begun\n");
+  const CommandExpiry& commands = valve_side_->commands();
+  const std::int64_t asked_us = commands.asked_ns() / 1000;
+  if (commands.asked_ns() <= commands.longest_ns() || asked_us == shortened_us_) return;
+  shortened_us_ = asked_us;
+  say(
+      fmt::format("softarm-plant: commands ask to be held for {:.3g} s; they expire after "
+                  "daemon.lcm.command_validity_s, {:.3g} s\n",
+                  to_seconds(commands.asked_ns()), to_seconds(commands.longest_ns())));
 }
 
 void PlantProcess::publish_state() {
   const ArmPlant& plant = arm_.plant();
   const Eigen::VectorXd& pressure = arm_.measured_pressures_bar();
   measurement_message_.time_us = (arm_.time_ns() + lost_ns_) / 1000;
-  measurement_message_.sequence = arm_.sequence();
+  measurement_message_.sequence = valve_side_ ? valve_side_->sequence() : arm_.sequence();
+  measurement_message_.expired =
+      valve_side_ ? static_cast<std::int32_t>(valve_side_->times_vented()) : 0;
+  measurement_message_.reason = static_cast<std::int8_t>(degraded_  ? ValveReason::other_sender
+                                                         : vented() ? ValveReason::no_command
+                                                                    : ValveReason::none);
   measurement_message_.num_chambers = static_cast<std::int16_t>(pressure.size());
   measurement_message_.pressure_bar.assign(pressure.begin(), pressure.end());
   if (!by_torque_ && !modbus_) node_.publish(lcm_.measurement_channel, measurement_message_);
@@ -137,7 +175,7 @@ void PlantProcess::publish_state() {
   const SegmentVector u = plant.u_rad();
   const SegmentVector velocity = plant.velocity_radps();
   state_message_.time_us = measurement_message_.time_us;
-  state_message_.vented = arm_.vented() ? 1 : 0;
+  state_message_.vented = vented() ? 1 : 0;
   state_message_.num_segments = static_cast<std::int16_t>(plant.segments());
   state_message_.num_chambers = measurement_message_.num_chambers;
   state_message_.u_rad.clear();

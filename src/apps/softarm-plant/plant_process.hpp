@@ -10,8 +10,10 @@
 #include <softarm_messages/torque_command_t.hpp>
 #include <vector>
 
+#include "softarm/base/clock.hpp"
 #include "softarm/config/experiment.hpp"
 #include "softarm/simulation/simulated_arm.hpp"
+#include "softarm/simulation/valve_side.hpp"
 #include "softarm/transport/lcm_node.hpp"
 #include "softarm/transport/mocap_source.hpp"
 #include "softarm/transport/settings.hpp"
@@ -41,10 +43,12 @@ class PlantProcess {
   void run();
 
  private:
+  bool vented() const { return valve_side_ ? valve_side_->vented() : arm_.vented(); }
   void take_commands(std::int64_t deadline_ns);
   void serve_requests(std::int64_t deadline_ns);
   std::int64_t arm_now_ns();
   void advance();
+  void advance_valve_side(std::int64_t now_ns);
   void take_command();
   template <class Message, class Values>
   void take_command(const Message& message, const Values& values);
@@ -55,6 +59,11 @@ class PlantProcess {
   LcmNode node_;
   SimulatedArm arm_;
   std::unique_ptr<ModbusSide> modbus_;
+  std::optional<ValveSide> valve_side_;  ///< where commands come over LCM
+  Eigen::VectorXd set_points_;           ///< that the arm's valves follow
+  PauseWatch pause_;
+  std::int64_t shortened_us_ = 0;  ///< reported validity of commands that are not held so long
+  bool local_, degraded_ = false;
   bool by_torque_;
   std::int64_t report_period_ns_;
   std::int64_t lost_ns_ = 0;

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <map>
 #include <memory>
+#include <optional>
 #include <stdexcept>
 #include <vector>
 
@@ -13,11 +14,11 @@
 #include "apps/progress.hpp"
 #include "apps/signals.hpp"
 #include "apps/softarm/commands.hpp"
+#include "softarm/base/output_file.hpp"
 #include "softarm/base/version.hpp"
 #include "softarm/client/arm_client.hpp"
 #include "softarm/commissioning/calibration/rest_calibration.hpp"
 #include "softarm/config/load.hpp"
-#include "softarm/recording/experiment_log.hpp"
 #include "softarm/transport/mocap_source.hpp"
 
 namespace softarm {
@@ -83,19 +84,22 @@ std::vector<MocapFrame> watch(const Experiment& experiment, double duration_s) {
 int calibrate(const CalibrateOptions& options) {
   namespace fs = std::filesystem;
   const Experiment experiment = load_experiment(options.config);
+  std::optional<OutputFile> output;  // refused before the arm is watched, not after
+  if (!options.output.empty()) output.emplace(options.output, experiment.files);
   catch_stop_signals();
   const auto frames = watch(experiment, options.duration_s);
   const RestCalibration found = calibrate_rest(experiment, frames, options.base);
   fmt::print("{}", calibration_text(experiment, found));
-  if (options.output.empty()) return kExitOk;
+  if (!output) return kExitOk;
   const std::string note = fmt::format(
       "Marker frames, S_i on the marker bodies: softarm calibrate {}, {} frames at rest.",
       version_text(), found.body.back().frames);
-  const fs::path folder = fs::absolute(options.output).parent_path();
-  write_text(options.output,
-             calibrated_yaml(experiment, found, note,
-                             fs::proximate(fs::absolute(options.config), folder).string()));
-  load_experiment(options.output);
+  const fs::path folder = fs::absolute(output->partial()).parent_path();
+  output->write(calibrated_yaml(experiment, found, note,
+                                fs::proximate(fs::absolute(options.config), folder).string()));
+  output->flush();
+  load_experiment(output->partial());
+  output->commit();
   fmt::print("{} has the marker frames: softarm check {}\n", options.output, options.output);
   return kExitOk;
 }

@@ -28,7 +28,7 @@ int check(const CheckOptions& options) {
   }
   const Experiment experiment = load_experiment(options.file);
   for (const std::string& warning : experiment_warnings(experiment)) {
-    fmt::print(stderr, "{}: warning: {}\n", options.file, warning);
+    say(fmt::format("{}: warning: {}\n", options.file, warning));
   }
   if (options.live) return check_live(experiment, options.live_check);
   fmt::print("# {}, configuration {}\n{}", options.file, hash_text(experiment.hash),

@@ -18,7 +18,7 @@ void add_eval_command(CLI::App& app);
 /// softarm identify CONFIG [--live | --log LOG] [--output FILE] [--seeds N]
 void add_identify_command(CLI::App& app);
 
-/// softarm import CSV MAP.yaml --out LOG
+/// softarm import CSV [MAP.yaml --out LOG]
 void add_import_command(CLI::App& app);
 
 /// softarm jog CONFIG SEGMENT CHAMBER PRESSURE

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <thread>
 
 #include "apps/program.hpp"
@@ -12,13 +13,13 @@
 #include "apps/signals.hpp"
 #include "apps/softarm/commands.hpp"
 #include "apps/softarm/identify_options.hpp"
+#include "softarm/base/output_file.hpp"
 #include "softarm/base/version.hpp"
 #include "softarm/commissioning/identification/fit_report.hpp"
 #include "softarm/commissioning/identification/live_experiment.hpp"
 #include "softarm/commissioning/identification/model_comparison.hpp"
 #include "softarm/commissioning/identification/residual_parts.hpp"
 #include "softarm/config/load.hpp"
-#include "softarm/recording/experiment_log.hpp"
 
 namespace softarm {
 namespace {
@@ -43,11 +44,13 @@ MotionRecord record_of(const Experiment& experiment, IdentifyCommand& command) {
   if (command.log.empty()) return record_step_response(experiment, command.plan);
   const LoggedMotion logged = read_log(experiment, command.log, command.input);
   command.damage = logged.damage;
+  if (!logged.notes.empty())
+    say(fmt::format("softarm: warning: {}: {}\n", command.log, logged.notes));
   MotionRecord record = logged.record;
   const double end_s = record.time_s[record.time_s.size() - 1] + 1e-6;
   const double to_s = command.to_s > 0.0 ? std::min(command.to_s, end_s) : end_s;
   record = record.part(command.from_s, to_s, 0.0);
-  record.scored_from_s = command.from_s + command.skip_s;
+  record.scored_from_s = std::max(logged.record.scored_from_s, command.from_s + command.skip_s);
   if (command.apart_s > 0.0) record = record.thinned(command.apart_s);
   return record;
 }
@@ -68,16 +71,29 @@ int print_coverage(const Experiment& experiment, const IdentifyCommand& command)
   return kExitOk;
 }
 
-void write_findings(const Experiment& experiment, const IdentifyCommand& command,
-                    const ParameterSet& set, const Refinement& fit) {
-  if (!command.out.empty()) {
-    const std::filesystem::path folder(command.out);
-    std::filesystem::create_directories(folder);
-    write_text(folder / "identification.csv", residuals_csv(fit));
-    fmt::print("{} has the measured and simulated motion: tools/plot_identification.py {}\n",
-               (folder / "identification.csv").string(), command.out);
+/// The files to write; opened before the arm moves, so that a wrong name is refused before.
+struct Findings {
+  std::optional<OutputFile> residuals, experiment;
+
+  Findings(const Experiment& of, const IdentifyCommand& command) {
+    Files inputs = of.files;
+    if (!command.log.empty()) inputs.emplace_back(command.log);
+    if (!command.output.empty()) experiment.emplace(command.output, inputs);
+    if (command.out.empty()) return;
+    std::filesystem::create_directories(command.out);
+    residuals.emplace(std::filesystem::path(command.out) / "identification.csv", inputs);
   }
-  if (command.output.empty()) return;
+};
+
+void write_findings(const Experiment& experiment, const IdentifyCommand& command,
+                    const ParameterSet& set, const Refinement& fit, Findings& findings) {
+  if (findings.residuals) {
+    findings.residuals->write(residuals_csv(fit));
+    findings.residuals->commit();
+    fmt::print("{} has the measured and simulated motion: tools/plot_identification.py {}\n",
+               (std::filesystem::path(command.out) / "identification.csv").string(), command.out);
+  }
+  if (!findings.experiment) return;
   const std::string note = fmt::format(
       "Identified by softarm {} from {}: residual {:.3g} mrad rms of a motion of {:.3g} mrad rms.",
       version_text(),
@@ -85,9 +101,12 @@ void write_findings(const Experiment& experiment, const IdentifyCommand& command
       : command.log.empty() ? "steps on the simulated arm"
                             : command.log,
       1e3 * fit.rms_rad, 1e3 * fit.motion_rms_rad);
-  write_text(command.output, identified_yaml(experiment, set.arm(fit.x), command.choice, note,
-                                             command.config, command.output));
-  load_experiment(command.output);
+  OutputFile& output = *findings.experiment;
+  output.write(identified_yaml(experiment, set.arm(fit.x), command.choice, note, command.config,
+                               output.partial()));
+  output.flush();
+  load_experiment(output.partial());
+  output.commit();
   fmt::print("{} has the values found: softarm run {}\n", command.output, command.output);
 }
 
@@ -107,6 +126,7 @@ int identify(IdentifyCommand& command) {
     print_error("softarm", fmt::format("--output: there is no folder {}", folder.string()));
     return kExitUsage;
   }
+  Findings findings(experiment, command);
 
   const MotionRecord record = record_of(experiment, command);
   const ParameterSet set(configured(experiment), experiment.actuation.kind, command.choice);
@@ -126,7 +146,7 @@ int identify(IdentifyCommand& command) {
     const Refinement& fit = comparison.trials.back().result.whole;
     fmt::print("{}\nas asked, on the whole record:\n{}{}", comparison_text(comparison),
                fit_table(set, fit), residual_parts_text(residual_parts(record, fit)));
-    write_findings(experiment, command, set, fit);
+    write_findings(experiment, command, set, fit, findings);
     return kExitOk;
   }
   if (command.predict) {
@@ -135,13 +155,13 @@ int identify(IdentifyCommand& command) {
         "{} predicts u to {:.4g} mrad rms a component; the motion's own is {:.4g} mrad rms "
         "about its mean\n",
         command.config, 1e3 * fit.rms_rad, 1e3 * fit.motion_rms_rad);
-    write_findings(experiment, command, set, fit);
+    write_findings(experiment, command, set, fit, findings);
     return kExitOk;
   }
   const Refinement fit = softarm::identify(set, record, command.options);
   fmt::print("{}{}", fit_table(set, fit), conditioning_text(set, fit));
   if (!command.log.empty()) fmt::print("{}", residual_parts_text(residual_parts(record, fit)));
-  write_findings(experiment, command, set, fit);
+  write_findings(experiment, command, set, fit, findings);
   return kExitOk;
 }
 

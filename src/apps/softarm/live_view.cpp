@@ -7,6 +7,7 @@
 #include <cmath>
 #include <utility>
 
+#include "apps/program.hpp"
 #include "softarm/base/clock.hpp"
 #include "softarm/base/time.hpp"
 
@@ -18,13 +19,15 @@ constexpr std::int64_t kRateSpan_ns = 1'000'000'000;
 constexpr int kShownSegments = 12;
 
 std::string flag_text(const ArmStatus& status) {
-  const std::pair<bool, const char*> flags[] = {{status.saturated, "saturated"},
-                                                {status.slew_limited, "slew limited"},
-                                                {status.reference_limited, "reference limited"},
-                                                {status.soft_limit, "soft limit"},
-                                                {status.shadow, "shadow"},
-                                                {status.armed, "armed"},
-                                                {status.bounded, "bounded"}};
+  const std::pair<bool, const char*> flags[] = {
+      {status.saturated, "saturated"},
+      {status.slew_limited, "slew limited"},
+      {status.reference_limited, "reference limited"},
+      {status.soft_limit, "soft limit"},
+      {status.shadow, "shadow"},
+      {status.armed, "armed"},
+      {status.bounded, "bounded"},
+      {status.length_warning, "length not as configured"}};
   std::string text;
   for (const auto& [set, name] : flags)
     if (set) text += fmt::format("   {}", name);
@@ -55,8 +58,8 @@ void LiveView::draw(const StatusRecord& record) {
     text += segment_text(status, i);
   if (status.segments() > kShownSegments)
     text += fmt::format("... {} segments more\n", status.segments() - kShownSegments);
-  if (lines_ > 0) fmt::print(stderr, "\033[{}A\033[J", lines_);
-  fmt::print(stderr, "{}", text);
+  if (lines_ > 0) say(fmt::format("\033[{}A\033[J", lines_));
+  say(text);
   lines_ = std::count(text.begin(), text.end(), '\n');
   drawn_ns_ = monotonic_now_ns();
 }

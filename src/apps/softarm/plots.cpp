@@ -18,8 +18,10 @@ void draw_plots(const std::string& folder) {
   const bool drawn = posix_spawn(&child, arguments[0], nullptr, nullptr, arguments, environ) == 0 &&
                      waitpid(child, &status, 0) == child && status == 0;
   if (!drawn)
-    print_error("softarm",
-                "no plots: is python3-matplotlib installed? Use --no-plots to do without");
+    print_error(
+        "softarm",
+        "no plots, for the reason above (is python3-matplotlib installed?); --no-plots does "
+        "without");
 }
 
 }  // namespace softarm

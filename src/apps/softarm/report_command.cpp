@@ -27,9 +27,9 @@ int report(const ReportOptions& options) {
   const Experiment experiment = load_experiment(options.config);
   EventLogReader log(std::filesystem::path(options.log));
   const auto size = static_cast<double>(std::filesystem::file_size(options.log));
-  StatusRecord record(experiment, options.out);
+  StatusRecord record(experiment, options.out, {options.log});
   Progress progress;
-  for (LogEvent event; log.next(event);) {
+  for (LogEvent event; record.failure().empty() && log.next(event);) {
     record.take(event.channel, event.data);
     if (progress.due()) {
       progress.update(fmt::format("{:3.0f} % of {}, {:.0f} s",
@@ -53,6 +53,10 @@ int report(const ReportOptions& options) {
   }
   fmt::print("{}log, summary and timing are in {}\n", record.table(), options.out);
   if (options.plots) draw_plots(options.out);
+  if (!record.failure().empty()) {
+    print_error("softarm", record.failure());
+    return kExitFailure;
+  }
   if (log.damage_count() > 0) {
     print_error("softarm", options.log + ": " + log.damage_text());
     return kExitData;

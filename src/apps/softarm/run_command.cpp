@@ -3,11 +3,11 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <filesystem>
 #include <memory>
 
 #include "apps/program.hpp"
 #include "apps/progress.hpp"
+#include "apps/signals.hpp"
 #include "apps/softarm/commands.hpp"
 #include "apps/softarm/plots.hpp"
 #include "softarm/base/clock.hpp"
@@ -40,16 +40,14 @@ struct Recorded {
 /// Steps the source of the rows to its end, or to `duration_s`; one row per tick, or per
 /// `ticks_a_row` ticks.
 template <class Stepper>
-Recorded record(Stepper& stepper, double duration_s, double period_s, std::int64_t ticks_a_row,
-                ExperimentLog& log, ShapeLog& shapes, TrackingSummary& summary) {
+void record(Stepper& stepper, double duration_s, double period_s, std::int64_t ticks_a_row,
+            ExperimentLog& log, ShapeLog& shapes, TrackingSummary& summary, Recorded& recorded) {
   Progress progress;
-  Recorded recorded;
   LogRow row;
-  const std::int64_t before_ns = monotonic_now_ns();
   const auto ticks = static_cast<std::int64_t>(std::llround(duration_s / period_s));
   for (std::int64_t k = 0; k < ticks; ++k) {
     const bool logged = k % ticks_a_row == 0;
-    if (!stepper.step(row, logged)) break;
+    if (stop_requested != 0 || !stepper.step(row, logged)) break;
     recorded.was_active |= stepper.pipeline().output().mode == Mode::active;
     if (!logged) continue;
     log.add(row);
@@ -58,10 +56,6 @@ Recorded record(Stepper& stepper, double duration_s, double period_s, std::int64
     if (progress.due())
       progress.update(fmt::format("{:.1f} of {:.1f} s, {}", row.t_s, duration_s, name(row.mode)));
   }
-  const ControlPipeline& pipeline = stepper.pipeline();
-  summary.set_frames(pipeline.counters(), pipeline.late_frames());
-  recorded.took_ns = monotonic_now_ns() - before_ns;
-  return recorded;
 }
 
 /// Why an arm was never ACTIVE, from its state at the end.
@@ -81,24 +75,38 @@ int run(const RunOptions& options) {
       options.duration_s > 0.0 ? options.duration_s : experiment.run.duration_s;
   const double period_s = 1.0 / experiment.rate_hz;
 
+  catch_stop_signals();  // what was recorded until then is kept
+
   TrackingSummary summary(experiment.arm.size(), experiment.run.tracking_from_s);
   if (experiment.actuation.kind == ActuationKind::torque) summary.commands_are_torques();
   TimingReport timing;
   std::string failure;
+  const Files inputs = options.mocap_log.empty() ? Files() : Files{options.mocap_log};
   const auto record_and_report = [&](auto& stepper) {
-    ExperimentLog log(options.out, experiment);
-    ShapeLog shapes(options.out, experiment);
+    ExperimentLog log(options.out, experiment, inputs);
+    ShapeLog shapes(options.out, experiment, inputs);
+    SummaryFiles files(options.out, experiment, inputs);
     const double log_rate_hz = experiment.run.log_rate_hz;
     const std::int64_t ticks_a_row =
         log_rate_hz > 0.0 ? std::max(1LL, std::llround(experiment.rate_hz / log_rate_hz)) : 1;
-    const Recorded recorded =
-        record(stepper, duration_s, period_s, ticks_a_row, log, shapes, summary);
-    log.close();
+    Recorded recorded;
+    const std::int64_t before_ns = monotonic_now_ns();
+    try {
+      record(stepper, duration_s, period_s, ticks_a_row, log, shapes, summary, recorded);
+      log.close();
+      shapes.close();
+    } catch (const OutputError& error) {  // what was recorded until then has a summary too
+      failure = error.what();
+    }
+    recorded.took_ns = monotonic_now_ns() - before_ns;
+    const ControlPipeline& pipeline = stepper.pipeline();
+    summary.set_frames(pipeline.counters(), pipeline.late_frames());
     timing.real_time_factor =
         summary.duration_s() / to_seconds(std::max<std::int64_t>(1, recorded.took_ns));
-    if (!recorded.was_active)
+    if (!recorded.was_active && failure.empty() && stop_requested == 0)
       failure = never_active(stepper.pipeline().output(), experiment, summary.duration_s());
     timing.histograms = {{"tick_us", stepper.tick_times().counts(), stepper.tick_times().max_us()}};
+    files.write(summary.json(), timing_json(timing));
   };
   std::unique_ptr<LoggedRun> logged;
   if (options.mocap_log.empty()) {
@@ -107,16 +115,22 @@ int run(const RunOptions& options) {
     logged = std::make_unique<LoggedRun>(experiment, options.mocap_log);
     record_and_report(*logged);
   }
-  const std::filesystem::path out(options.out);
-  write_text(out / "summary.json", summary.json());
-  write_text(out / "timing.json", timing_json(timing));
+  release_stop_signals();
   fmt::print("{}{:.0f} times faster than real time; log, summary and timing are in {}\n",
              summary.table(), timing.real_time_factor, options.out);
-  if (options.plots) draw_plots(options.out);
+  if (stop_requested != 0 && failure.empty())
+    failure = fmt::format("stopped after {:.3g} of {:.3g} s", summary.duration_s(), duration_s);
+  else if (options.plots)
+    draw_plots(options.out);
   if (!failure.empty()) print_error("softarm", failure);
-  if (logged && logged->log().damage_count() > 0) {
-    print_error("softarm", options.mocap_log + ": " + logged->log().damage_text());
-    return kExitData;
+  if (logged) {
+    const LogTimeline& timeline = logged->timeline();
+    if (!timeline.text().empty())
+      say(fmt::format("softarm: {}: {}: {}\n", timeline.restarted() ? "error" : "warning",
+                      options.mocap_log, timeline.text()));
+    if (logged->log().damage_count() > 0)
+      print_error("softarm", options.mocap_log + ": " + logged->log().damage_text());
+    if (logged->log().damage_count() > 0 || timeline.restarted()) return kExitData;
   }
   return failure.empty() ? kExitOk : kExitFailure;
 }

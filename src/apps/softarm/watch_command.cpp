@@ -43,6 +43,8 @@ int watch(const WatchOptions& options) {
   const Experiment experiment = load_experiment(options.config);
   catch_stop_signals();
   const LcmSettings& lcm = experiment.transport.lcm;
+  if (const std::string warning = network_warning(lcm.url); !warning.empty())
+    say(fmt::format("softarm: warning: {}\n", warning));
   OperatorClient client(lcm);
   client.listen(lcm.plant_channel);
   client.listen(lcm.timing_channel);
@@ -57,7 +59,7 @@ int watch(const WatchOptions& options) {
   const auto done = [&] {
     return options.duration_s > 0.0 && record.active_s() >= options.duration_s;
   };
-  while (stop_requested == 0 && !done()) {
+  while (stop_requested == 0 && !done() && record.failure().empty()) {
     client.update(client.now_ns() + 100'000'000);
     if (client.now_ns() - last_status_ns > kSilence_ns) {
       print_error("softarm",
@@ -85,7 +87,9 @@ int watch(const WatchOptions& options) {
     return kExitFailure;
   }
   fmt::print("{}", record.table());
-  return kExitOk;
+  if (record.failure().empty()) return kExitOk;
+  print_error("softarm", record.failure());
+  return kExitFailure;
 }
 
 }  // namespace

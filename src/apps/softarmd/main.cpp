@@ -2,9 +2,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <optional>
 
 #include "apps/program.hpp"
 #include "apps/signals.hpp"
+#include "softarm/base/fault_latch.hpp"
 #include "softarm/base/instance_lock.hpp"
 #include "softarm/base/line_log.hpp"
 #include "softarm/base/realtime.hpp"
@@ -40,8 +42,38 @@ void print_summary(const DaemonLoop& loop) {
       loop.link().malformed(), loop.link().unsent()));
 }
 
+/// Keeps every FAULT until an operator has acknowledged it, beyond the end of this process too.
+class Latched {
+ public:
+  Latched(const std::string& name, const std::string& path, LineLog& log)
+      : latch_(state_directory(), name) {
+    if (!latch_.problem().empty())
+      log.add("warning: {}: {}; a FAULT will be forgotten when softarmd ends",
+              latch_.file().string(), latch_.problem());
+    if (!begins_stopped()) return;
+    log.add("FAULT: {} of the last run, which nobody has acknowledged ({})", latch_.found(),
+            latch_.file().string());
+    log.add("FAULT: once the arm may move again, softarm disarm {}, then softarm arm {}", path,
+            path);
+  }
+  bool begins_stopped() const { return !latch_.found().empty(); }
+  void note(Mode mode, Reason reason) noexcept {
+    if (mode == Mode::fault) {
+      latch_.set(name(reason));
+    } else if (mode_ == Mode::fault) {
+      latch_.clear();
+    }
+    mode_ = mode;
+  }
+
+ private:
+  FaultLatch latch_;
+  Mode mode_ = Mode::init;
+};
+
 /// Prints every change of mode or reason, and what was refused; reports to the service manager.
-void run(DaemonLoop& loop, LineLog& log, ServiceNotifier& service, const LcmSettings& lcm) {
+void run(DaemonLoop& loop, LineLog& log, ServiceNotifier& service, const LcmSettings& lcm,
+         Latched* latched) {
   constexpr std::int64_t kRefused_ns = 1'000'000'000;  // malformed messages may come at any rate
   Mode mode = Mode::init;
   Reason reason = Reason::none;
@@ -67,18 +99,31 @@ void run(DaemonLoop& loop, LineLog& log, ServiceNotifier& service, const LcmSett
     if (const auto text = report_inputs.second_sender(now_ns, counts); !text.empty())
       log.add("{}", text);
   };
+  std::int32_t held_us = loop.link().asked_us();
+  const auto report_validity = [&] {
+    if (loop.link().held_us() == held_us) return;
+    held_us = loop.link().held_us();
+    if (held_us < loop.link().asked_us())
+      log.add(
+          "commands are valid for {:.3g} s (daemon.lcm.command_validity_s), but the valve side "
+          "lets "
+          "them expire after {:.3g} s",
+          1e-6 * loop.link().asked_us(), 1e-6 * held_us);
+  };
   loop.run([] { return stop_requested != 0; },
            [&](const DaemonLoop::Report& report) {
              const TickOutput& output = loop.pipeline().output();
              if (output.mode != mode || output.reason != reason) {
                mode = output.mode;
                reason = output.reason;
+               if (latched != nullptr) latched->note(mode, reason);
                const bool verdict = reason == Reason::frames_refused;
                log.add("{:.3f} s: {} ({}{}{})", to_seconds(report.since_start_ns), name(mode),
                        name(reason), verdict ? ": " : "", verdict ? name(output.refusal) : "");
              }
              report_refused(report.woken_ns);
              report_streams(report.woken_ns);
+             report_validity();
              service.report(report.woken_ns, {.state = name(mode),
                                               .reason = name(reason),
                                               .on_time = report.on_time,
@@ -91,7 +136,8 @@ int serve(const std::string& path, bool shadow) {
   const Experiment experiment = load_experiment(path);
   const LcmSettings& lcm = experiment.transport.lcm;
   const std::string channel = lcm.command_channel + (shadow ? " (shadow)" : "");
-  const InstanceLock lock(lock_name(channel, lcm.url));
+  const std::string name = lock_name(channel, lcm.url);
+  const InstanceLock lock(name);
   catch_stop_signals();
   ignore_broken_pipes();
 
@@ -103,10 +149,13 @@ int serve(const std::string& path, bool shadow) {
     say(fmt::format("softarmd: warning: {}\n", warning));
   ServiceNotifier service;
   if (!service.problem().empty()) say(fmt::format("softarmd: warning: {}\n", service.problem()));
-  // A thread inherits the scheduling in force when it starts. The printing thread gets none of it;
+  // A thread inherits the scheduling in force when it starts. The threads that print and that write
+  // the latch get none of it;
   // LCM's receive thread stays one below the tick, which a flood of messages would otherwise
   // starve.
   LineLog log("softarmd", say);
+  std::optional<Latched> latched;  // a shadow commands nothing
+  if (!shadow) latched.emplace(name, path, log);
   // The tick's priority is requested first and its refusal is reported: a later refusal has the
   // same cause, or is for a lower priority.
   const RealtimeSettings& realtime = experiment.realtime;
@@ -122,7 +171,8 @@ int serve(const std::string& path, bool shadow) {
                    .build = build_text()},
                   shadow);
   apply_realtime_settings(realtime);
-  run(loop, log, service, lcm);
+  if (latched && latched->begins_stopped()) loop.begin_stopped();
+  run(loop, log, service, lcm, latched ? &*latched : nullptr);
   log.finish();
   print_summary(loop);
   return kExitOk;

@@ -33,8 +33,9 @@ std::string list(int count, const Value& value) {
   return text + "]";
 }
 
-/// The chambers with the angles and gains of the input map.
-std::string chambers_yaml(const ArmHypothesis& arm, const char* indent) {
+/// The chambers with the angles and gains of the input map, and the offsets of `actuation`.
+std::string chambers_yaml(const ArmHypothesis& arm, const ActuationSettings& actuation,
+                          const char* indent) {
   std::string text;
   for (int i = 0; i < arm.arm.size(); ++i) {
     std::vector<double> angles, gains;
@@ -50,8 +51,15 @@ std::string chambers_yaml(const ArmHypothesis& arm, const char* indent) {
     const auto of = [](const std::vector<double>& values) {
       return [&values](int j) { return values[static_cast<std::size_t>(j)]; };
     };
-    text += fmt::format("{}  - {{angle_rad: {}, gain_nm_per_bar: {}}}\n", indent,
-                        list(count, of(angles)), list(count, of(gains)));
+    std::string offsets;
+    const std::vector<Chamber>& chambers = actuation.segments[static_cast<std::size_t>(i)];
+    if (std::any_of(chambers.begin(), chambers.end(),
+                    [](const Chamber& c) { return c.offset_m != Chamber{}.offset_m; })) {
+      offsets = ", offset_m: " +
+                list(count, [&](int j) { return chambers[static_cast<std::size_t>(j)].offset_m; });
+    }
+    text += fmt::format("{}  - {{angle_rad: {}, gain_nm_per_bar: {}{}}}\n", indent,
+                        list(count, of(angles)), list(count, of(gains)), offsets);
   }
   return text;
 }
@@ -131,7 +139,8 @@ std::string identified_yaml(const Experiment& experiment, const ArmHypothesis& a
   std::string text = fmt::format("# {}\ninclude: {}\n\narm:\n{}", note,
                                  fs::proximate(fs::absolute(config), folder).string(),
                                  segments_yaml(arm.arm, "  "));
-  if (chambers) text += "\nactuation:\n  chambers:\n" + chambers_yaml(arm, "  ");
+  if (chambers)
+    text += "\nactuation:\n  chambers:\n" + chambers_yaml(arm, experiment.actuation, "  ");
   text += fmt::format(
       "\nidentification:\n  lag_s: {:.6g}\n  delay_s: {:.6g}\n  cubic_nm_per_rad3: {:.6g}\n"
       "  rest_u_rad: [",
@@ -146,7 +155,8 @@ std::string identified_yaml(const Experiment& experiment, const ArmHypothesis& a
   text += "\n# The simulated arm is what it was.\nplant:\n  arm:\n" +
           segments_yaml(experiment.plant.arm, "    ");
   if (chambers)
-    text += "  actuation:\n    chambers:\n" + chambers_yaml(of_plant(experiment), "    ");
+    text += "  actuation:\n    chambers:\n" +
+            chambers_yaml(of_plant(experiment), experiment.plant.actuation, "    ");
   return text;
 }
 

@@ -14,6 +14,9 @@
 namespace softarm {
 namespace {
 
+constexpr double kMostInstants = 1e7;  ///< of a record on its even grid
+constexpr double kMostPeriods =
+    10.0;  ///< frames further apart, and than a window, do not show the motion
 constexpr double kRidge =
     1e-6;  ///< of the mean information: keeps what the motion does not determine
 
@@ -49,8 +52,11 @@ struct SmoothMotion {
   std::vector<Eigen::VectorXd> u, velocity, acceleration, input;
 };
 
-Eigen::MatrixXd evenly(const MotionRecord& record, double period_s, Eigen::Index count) {
+/// u on an even grid. @param apart_s  gets how far apart the frames around every instant are
+Eigen::MatrixXd evenly(const MotionRecord& record, double period_s, Eigen::Index count,
+                       Eigen::VectorXd& apart_s) {
   Eigen::MatrixXd u(count, record.u_rad.cols());
+  apart_s.resize(count);
   Eigen::Index next = 1;
   for (Eigen::Index k = 0; k < count; ++k) {
     const double t = record.time_s[0] + static_cast<double>(k) * period_s;
@@ -58,6 +64,7 @@ Eigen::MatrixXd evenly(const MotionRecord& record, double period_s, Eigen::Index
     const double x = std::clamp(
         (t - record.time_s[next - 1]) / (record.time_s[next] - record.time_s[next - 1]), 0.0, 1.0);
     u.row(k) = (1.0 - x) * record.u_rad.row(next - 1) + x * record.u_rad.row(next);
+    apart_s[k] = record.time_s[next] - record.time_s[next - 1];
   }
   return u;
 }
@@ -75,8 +82,14 @@ SmoothMotion smooth(const MotionRecord& record, double window_s, double lag_s, d
                                          record.time_s.size()));
   const double period_s = typical_period_s(record);
   const double span_s = record.time_s[record.time_s.size() - 1] - record.time_s[0];
+  if (!(span_s <= kMostInstants * period_s))
+    throw std::runtime_error(
+        fmt::format("a record of {} frames over {:.4g} s has too few frames for its length",
+                    record.time_s.size(), span_s));
   const auto count = static_cast<Eigen::Index>(std::floor(span_s / period_s + 0.5)) + 1;
-  const Eigen::MatrixXd u = evenly(record, period_s, count);
+  Eigen::VectorXd apart_s;
+  const Eigen::MatrixXd u = evenly(record, period_s, count, apart_s);
+  const double longest_s = std::max(window_s, kMostPeriods * period_s);
   Eigen::MatrixXd input(count, record.input.value.cols());
   LaggedInput lagged(record.input, lag_s, dead_time_s);
   Eigen::VectorXd p(input.cols());
@@ -89,6 +102,7 @@ SmoothMotion smooth(const MotionRecord& record, double window_s, double lag_s, d
   for (Eigen::Index k = 0; k + kernel.value.size() <= count; k += kernel.half()) {
     const double t = record.time_s[0] + static_cast<double>(k) * period_s;
     if (t < record.scored_from_s) continue;
+    if (apart_s.segment(k, kernel.value.size()).maxCoeff() > longest_s) continue;  // not seen
     const auto part = u.middleRows(k, kernel.value.size()).transpose();
     out.u.emplace_back(part * kernel.value);
     out.velocity.emplace_back(part * kernel.first);

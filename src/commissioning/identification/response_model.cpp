@@ -22,7 +22,8 @@ constexpr double kStep = 2.0;  ///< times the fastest mode's time constant; stab
 ArmHypothesis hypothesis(const ArmParameters& arm, const ActuationSettings& actuation) {
   ArmHypothesis out;
   out.arm = arm;
-  out.rest_rad.setZero(arm.dof());
+  out.arm.extensible = false;  // what is identified is how segments bend
+  out.rest_rad.setZero(2 * arm.size());
   out.input_map.resize(2, chamber_count(actuation));
   Eigen::Index first = 0;
   for (std::size_t i = 0; i < actuation.segments.size(); ++i) {

@@ -1,11 +1,6 @@
 // Disturbances from outside: the wall clock of the daemon's machine is set, a person leans on the
 // arm.
-#include <fcntl.h>
-#include <sys/mman.h>
-#include <unistd.h>
-
-#include <atomic>
-
+#include "faults/preloaded_clocks.hpp"
 #include "faults/softarmd/fault_test.hpp"
 
 namespace softarm {
@@ -16,35 +11,6 @@ using test::Station;
 
 class Surroundings : public FaultTest {};
 
-/// The wall clock of a process started with `preload` (wall_clock.cpp): this process sets it.
-class WallClock {
- public:
-  explicit WallClock(const std::string& path) : path_(path) {
-    const int file = open(path.c_str(), O_RDWR | O_CREAT, 0600);
-    if (file < 0 || ftruncate(file, 2 * sizeof(std::int64_t)) != 0) return;
-    void* const mapped =
-        mmap(nullptr, 2 * sizeof(std::int64_t), PROT_READ | PROT_WRITE, MAP_SHARED, file, 0);
-    close(file);
-    if (mapped != MAP_FAILED) shared_ = static_cast<std::atomic<std::int64_t>*>(mapped);
-  }
-  ~WallClock() {
-    if (shared_ != nullptr) munmap(shared_, 2 * sizeof(std::int64_t));
-  }
-  WallClock(const WallClock&) = delete;
-  WallClock& operator=(const WallClock&) = delete;
-
-  bool made() const { return shared_ != nullptr; }
-  std::vector<std::string> preload() const {
-    return {"LD_PRELOAD=" SOFTARM_WALL_CLOCK, "SOFTARM_WALL_CLOCK=" + path_};
-  }
-  void set_offset_s(std::int64_t offset_s) { shared_[0] = offset_s; }
-  std::int64_t reads() const { return shared_[1]; }
-
- private:
-  std::string path_;
-  std::atomic<std::int64_t>* shared_ = nullptr;
-};
-
 TEST_P(Surroundings, AWallClockThatIsSetDisturbsNothing) {
 #ifdef SOFTARM_SANITIZED
   GTEST_SKIP() << "a sanitizer's runtime must be loaded first";
@@ -54,7 +20,7 @@ TEST_P(Surroundings, AWallClockThatIsSetDisturbsNothing) {
   write_config("paper_arm.yaml",
                "  safety: {hold_after_s: 1, vent_after_s: 2, max_latency_s: 1, good_frames: 20}\n" +
                    realtime());
-  WallClock clock((folder_ / "wall_clock").string());
+  test::PreloadedClocks clock((folder_ / "wall_clock").string());
   ASSERT_TRUE(clock.made());
   const auto plant = start_plant(*this);
   std::vector<std::string> arguments = clock.preload();

@@ -82,6 +82,26 @@ TEST(ClosedLoop, MismatchedArmTracksThePapersReference) {
   EXPECT_LE(track(configured("paper_arm_mismatch.yaml"), 20.0, 1.0).rms_rad, 0.02);
 }
 
+TEST(ClosedLoop, AnArmThatStretchesIsReportedAndBeyondTheLimitAFault) {
+  Experiment experiment = configured("paper_arm_stretching.yaml");
+  const auto run = [&](double length_fault) {
+    experiment.safety.length_fault = length_fault;
+    LockStep lock_step(experiment, experiment.plant);
+    LogRow row;
+    bool warned = false;
+    for (int k = 0; k < 5000; ++k) {
+      lock_step.step(row);
+      warned |= lock_step.pipeline().output().length_warning;
+    }
+    EXPECT_TRUE(warned);
+    return row;
+  };
+  EXPECT_EQ(run(0.25).mode, Mode::active);
+  const LogRow fault = run(0.1);
+  EXPECT_EQ(fault.mode, Mode::fault);
+  EXPECT_EQ(fault.reason, Reason::length_mismatch);
+}
+
 TEST(ClosedLoop, PolarModeWithThePapersGainsTracksFromTenSecondsOn) {
   bool saturated = false;
   const Tracking tracking = track(configured("paper_arm_polar.yaml"), 20.0, 10.0,

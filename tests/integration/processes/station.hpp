@@ -29,7 +29,12 @@ inline constexpr std::int64_t kSecond = 1'000'000'000;
 
 class Station {
  public:
-  Station() { write_config("paper_arm.yaml", std::string("  safety: {") + kPatientSafety + "}\n"); }
+  Station() {
+    // No daemon finds the FAULT of another test.
+    setenv("XDG_STATE_HOME", folder_.path().c_str(), 1);
+    unsetenv("STATE_DIRECTORY");
+    write_config("paper_arm.yaml", std::string("  safety: {") + kPatientSafety + "}\n");
+  }
 
   /// Begins to listen to an arm with as many segments as that of config/BASE.
   /// @throws TransportError

@@ -9,6 +9,7 @@
 #include <functional>
 #include <regex>
 
+#include "faults/preloaded_clocks.hpp"
 #include "integration/valves/relay.hpp"
 #include "integration/valves/valves_program.hpp"
 
@@ -188,6 +189,51 @@ TEST_F(ValvesBehindARelay, AStoppedAndContinuedDriverVents) {
       << driver_->printed();
   expect_recovery();
 }
+
+#ifndef SOFTARM_SANITIZED  // a sanitizer's runtime must be loaded first
+/// The same driver on clocks that the test sets.
+class ValvesOnPausedMachines : public ValvesBehindARelay {
+ protected:
+  void begin_on_set_clocks() {
+    clocks_ = std::make_unique<test::PreloadedClocks>((folder_ / "clocks").string());
+    ASSERT_TRUE(clocks_->made());
+    begin();
+    driver_.reset();
+    std::vector<std::string> arguments = clocks_->preload();
+    arguments.push_back(std::string(SOFTARM_BINARY_DIR) + "/bin/softarm-valves");
+    driver_ = start("/env", arguments);
+    ASSERT_TRUE(run_at(0.3)) << driver_->printed();
+  }
+  std::unique_ptr<test::PreloadedClocks> clocks_;
+};
+
+TEST_F(ValvesOnPausedMachines, ASuspendVents) {
+  begin_on_set_clocks();
+  clocks_->suspend(5 * test::kSecond);
+  EXPECT_TRUE(command_until(0.3, [&] { return is(ValveState::degraded, ValveReason::time_gap); }))
+      << driver_->printed();
+  EXPECT_TRUE(command_until(0.3, [&] { return plant_.pressure_bar[0] < 0.02; }));
+  expect_recovery();
+}
+
+// The terminal has vented by itself meanwhile. What it holds is read before it is written again.
+TEST_F(ValvesOnPausedMachines, APauseThatNoClockCountsVentsToo) {
+  begin_on_set_clocks();
+  const std::int64_t stopped_ns = monotonic_now_ns();
+  driver_->stop();
+  ASSERT_TRUE(command_until(0.3, [&] { return plant_.vented && plant_.pressure_bar[0] < 0.02; }));
+  clocks_->lose(monotonic_now_ns() - stopped_ns);
+  double highest_bar = 0.0;
+  const int before = valve_statuses_;
+  driver_->signal(SIGCONT);
+  EXPECT_TRUE(command_until(0.3, [&] {
+    highest_bar = std::max(highest_bar, plant_.pressure_bar[0]);
+    return valve_statuses_ > before && is(ValveState::degraded, ValveReason::echo_mismatch);
+  })) << driver_->printed();
+  EXPECT_LT(highest_bar, 0.05) << "it is not filled again";
+  expect_recovery();
+}
+#endif
 
 TEST_F(ValvesBehindARelay, WithExplicitArmingCommandsOfZeroComeFirst) {
   begin("", ", arming: explicit");

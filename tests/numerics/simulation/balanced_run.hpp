@@ -11,6 +11,7 @@ namespace softarm {
 
 struct Outcome {
   SegmentVector u;
+  Eigen::VectorXd x;         ///< all coordinates
   double imbalance_j = 0.0;  ///< largest of |stored - supplied + dissipated|
   IntegratorCounters counters;
 };
@@ -32,6 +33,7 @@ inline Outcome balanced_run(PlantSettings settings, const std::vector<double>& p
         std::max(result.imbalance_j, std::abs(stored - now.supplied + now.dissipated));
   }
   result.u = plant.u_rad();
+  result.x = plant.coordinates();
   result.counters = plant.counters();
   return result;
 }

@@ -44,6 +44,7 @@ const std::vector<Trigger> kTriggers = {
     {Reason::disarmed, 2, [](SafetyInput& in) { in.requests.disarm = true; }},
     {Reason::pressure_mismatch, 3, [](SafetyInput& in) { in.pressure_mismatch = true; }},
     {Reason::curvature_mismatch, 4, [](SafetyInput& in) { in.curvature_mismatch = true; }},
+    {Reason::length_mismatch, 13, [](SafetyInput& in) { in.length_mismatch = true; }},
     {Reason::deadman_released, 5,
      [](SafetyInput& in) { in.newest_go_ns = in.now_ns - kDeadman - kStep; }},
     {Reason::deadman_released, 5, [](SafetyInput& in) { in.newest_go_ns = kNever; }},
@@ -58,8 +59,8 @@ const std::vector<Trigger> kTriggers = {
      [](SafetyInput& in) { in.newest_capture_ns = in.now_ns - kHold - kStep; }},
     {Reason::frames_late, 11, [](SafetyInput& in) { in.motion_unknown = true; }},
     {Reason::poses_frozen, 12, [](SafetyInput& in) { in.poses_frozen = true; }},
-    {Reason::frame_period_mismatch, 13, [](SafetyInput& in) { in.frame_period_mismatch = true; }},
-    {Reason::activated_too_often, 14, [](SafetyInput& in) { in.activated_too_often = true; }},
+    {Reason::frame_period_mismatch, 20, [](SafetyInput& in) { in.frame_period_mismatch = true; }},
+    {Reason::activated_too_often, 21, [](SafetyInput& in) { in.activated_too_often = true; }},
     {Reason::overruns, 10, [](SafetyInput& in) { in.consecutive_overruns = kHoldOverruns; }},
     {Reason::overruns, 10, [](SafetyInput& in) { in.consecutive_overruns = kVentOverruns - 1; }},
 };

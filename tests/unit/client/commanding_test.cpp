@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "softarm/base/instance_lock.hpp"
+#include "suspended_clock.hpp"
 #include "unit/client/client_test.hpp"
 
 namespace softarm {
@@ -47,6 +48,39 @@ TEST_F(Commanding, NeedsTheLockChambersAndTheRightSize) {
   EXPECT_EQ(sent->front().num_chambers, 3);
   set_torque_actuation(experiment.actuation, 1, 0.5);
   EXPECT_THROW(ArmClient(experiment).lock_commands(), std::logic_error);
+}
+
+// The valves were vented meanwhile, by their own clock.
+TEST_F(Commanding, BeginsAtZeroAfterASuspend) {
+#ifndef SOFTARM_SETS_CLOCK
+  GTEST_SKIP() << "a sanitizer brings its own clock_gettime";
+#endif
+  step_ns = kMs;
+  client->lock_commands();
+  const PressureVector wanted = PressureVector::Constant(3, 1.0);
+  while (client->set_points_bar()[0] < 0.5) client->command_chambers(wanted);
+  EXPECT_FALSE(client->held_up());
+  test::suspended_ns += 60'000 * kMs;
+  client->command_chambers(wanted);
+  EXPECT_LT(client->set_points_bar()[0], 0.1);
+  EXPECT_TRUE(client->held_up());
+}
+
+TEST_F(Commanding, BeginsAtZeroWhereTheValvesReportThatTheyHaveVented) {
+  step_ns = kMs;
+  client->lock_commands();
+  auto measurement = test::example<pressure_measurement_t>(1, 3);
+  peer->publish(lcm.measurement_channel, measurement);
+  ASSERT_TRUE(wait_for([&] { return client->measured().has_value(); }));
+  const PressureVector wanted = PressureVector::Constant(3, 1.0);
+  while (client->set_points_bar()[0] < 0.5) client->command_chambers(wanted);
+  ++measurement.expired;
+  measurement.pressure_bar[0] += 0.5F;
+  const double reported = static_cast<double>(measurement.pressure_bar[0]);
+  peer->publish(lcm.measurement_channel, measurement);
+  ASSERT_TRUE(wait_for([&] { return client->measured()->bar[0] == reported; }));
+  EXPECT_EQ(client->set_points_bar()[0], 0.0);
+  EXPECT_TRUE(client->held_up());
 }
 
 TEST_F(Commanding, IsForOneAtATime) {

@@ -23,6 +23,7 @@ class Daemon {
     });
     thread_ = std::thread([this] {
       while (!stop_) {
+        status_.nonce = ++nonce_;
         node_.publish(lcm_.status_channel, status_);
         node_.wait_until(monotonic_now_ns() + 5'000'000);
       }
@@ -34,6 +35,12 @@ class Daemon {
     if (thread_.joinable()) thread_.join();
   }
   /// After `end`.
+  /// The one that the client echoed first: it must echo this one all the time.
+  std::int64_t first_nonce() const {
+    for (const operator_command_t& each : requests_)
+      if (each.nonce != 0) return each.nonce;
+    return 0;
+  }
   const std::vector<operator_command_t>& requests() const { return requests_; }
 
  private:
@@ -53,6 +60,7 @@ class Daemon {
   LcmNode node_;
   controller_status_t status_;
   int deaf_to_;
+  std::int64_t nonce_ = 1000;
   std::vector<operator_command_t> requests_;
   std::atomic<bool> stop_{false};
   std::thread thread_;
@@ -86,10 +94,11 @@ TEST_F(Requests, AreRepeatedUntilTheStatusShowsThem) {
     EXPECT_EQ(client->request(row.what, test::kPatience_s), RequestOutcome::done);
     daemon.end();
     ASSERT_GE(daemon.requests().size(), 3u) << "the daemon missed two";
+    EXPECT_EQ(daemon.requests().back().nonce, daemon.first_nonce());
     for (std::size_t k = 0; k < daemon.requests().size(); ++k) {
       EXPECT_EQ(daemon.requests()[k].request, row.on_the_wire);
       if (k == 0) continue;
-      EXPECT_GT(daemon.requests()[k].sequence, daemon.requests()[k - 1].sequence);
+      EXPECT_EQ(daemon.requests()[k].sequence, daemon.requests()[k - 1].sequence);
     }
   }
 }
@@ -125,10 +134,13 @@ TEST_F(Requests, WithoutADaemonNobodyIsHeard) {
 
 TEST_F(Requests, GoesCountUpAndAreTakenBack) {
   const auto goes = peer_hears<deadman_t>(lcm.deadman_channel);
+  publish_status(Mode::active, Reason::none);
+  ASSERT_TRUE(client->wait_for_status(test::kPatience_s));
   for (const bool go : {true, true, false}) client->send_go(go);
   ASSERT_TRUE(wait_for([&] { return goes->size() == 3; }));
   EXPECT_EQ((*goes)[0].go, 1);
   EXPECT_EQ((*goes)[2].go, 0);
+  EXPECT_EQ((*goes)[0].nonce, client->status()->nonce);
   EXPECT_LT((*goes)[0].sequence, (*goes)[1].sequence);
   EXPECT_LT((*goes)[1].sequence, (*goes)[2].sequence);
   LcmSettings without = lcm;

@@ -139,9 +139,8 @@ const BadLine kBadLines[] = {
     {"[0, pi/2, pi, 3*pi/2]", "[0, pi]", "actuation.chambers", "at least 3 chambers", "chambers:"},
     {"[0, pi/2, pi, 3*pi/2]", "[0, 0.5, 1]", "actuation.chambers", "every direction", "chambers:"},
     // not YAML as we take it
-    {"  mass_kg: 0.15", "  mass_kg: [0.15", "", "valid YAML", "stiffness_nm_per_rad"},
+    {"  mass_kg: 0.15", "  mass_kg: [0.15", "arm.mass_kg", "a closing bracket"},
     {"  mass_kg: 0.15", "  mass_kg: !!float 0.15", "arm.mass_kg", "no tags"},
-    {"  mass_kg: 0.15", "  mass_kg: &mass 0.15", "arm.mass_kg", "no anchors"},
     {"  mass_kg: 0.15", "  ? [mass_kg]\n  : 0.15", "arm", "a word as key", "[mass_kg]"},
 };
 

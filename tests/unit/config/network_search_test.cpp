@@ -2,6 +2,7 @@
 #include "softarm/config/network_search.hpp"
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <filesystem>
 #include <string>
@@ -46,6 +47,14 @@ TEST_F(NetworkSearch, EndsWhereFilesIncludeOneAnotherOrAreNotThere) {
       find_network(write("round.yaml", "include: round.yaml\nurl: udpm://239.1.1.3:3\n"));
   EXPECT_EQ(lcm.url, "udpm://239.1.1.3:3");
   EXPECT_EQ(find_network(folder_ / "missing.yaml").url, LcmSettings().url);
+  // So many readings as would last for hours.
+  std::string often;
+  for (int k = 0; k < 12; ++k) often += "include: often.yaml\n";
+  EXPECT_EQ(find_network(write("often.yaml", often + "url: udpm://239.1.1.4:4\n")).url,
+            "udpm://239.1.1.4:4");
+  const std::filesystem::path pipe = folder_ / "pipe.yaml";
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  EXPECT_EQ(find_network(pipe).url, LcmSettings().url);
 }
 
 }  // namespace

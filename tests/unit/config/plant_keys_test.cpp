@@ -72,5 +72,74 @@ TEST(PlantKeys, TorqueIsForSimulatedArmsAlone) {
   refuses("plant: {refined: {pieces: 2, mass_weights: [1, 2, 3]}}\n", "plant.refined.mass_weights");
 }
 
+constexpr const char* kChambers = R"(name: stretches
+arm: {segments: 3, length_m: 0.11, mass_kg: 0.15, stiffness_nm_per_rad: 0.6, damping_nms_per_rad: 0.03}
+actuation: {chambers: {angle_rad: [0, 2, 4], gain_nm_per_bar: 0.8}}
+control: {kp_nm_per_rad: 1, kd_nms_per_rad: 0}
+reference:
+  - {kind: set_point, theta_rad: 0.2}
+)";
+
+TEST(PlantKeys, SegmentsThatStretch) {
+  const TestFolder folder;
+  const auto load = [&](const std::string& more) {
+    return load_experiment(folder.write("a.yaml", kChambers + more));
+  };
+  const Experiment plain = load("");
+  EXPECT_FALSE(plain.arm.extensible || plain.plant.arm.extensible);
+
+  const Experiment all = load(R"(plant:
+  arm: {extensible: true, axial_stiffness_n_per_m: [3000, 4000, 5000], axial_damping_ns_per_m: 150}
+  actuation: {chambers: {angle_rad: [0, 2, 4], gain_nm_per_bar: 0.8, offset_m: [0.01, 0.01, 0.02]}}
+)");
+  EXPECT_FALSE(all.arm.extensible);
+  EXPECT_TRUE(all.plant.arm.extensible);
+  EXPECT_EQ(all.plant.arm.segments[2].axial_stiffness_n_per_m, 5000.0);
+  EXPECT_EQ(all.plant.arm.segments[1].axial_damping_ns_per_m, 150.0);
+  EXPECT_FALSE(all.plant.arm.segments[1].constant_length);
+  EXPECT_EQ(all.plant.actuation.segments[0][2].offset_m, 0.02);
+
+  const Experiment some = load("plant: {arm: {extensible: [1, 0, 1]}}\n");
+  EXPECT_TRUE(some.plant.arm.extensible);
+  EXPECT_TRUE(some.plant.arm.segments[1].constant_length);
+  EXPECT_FALSE(some.plant.arm.segments[2].constant_length);
+  for (const Experiment& one : {plain, all, some}) {
+    const Experiment again = load_experiment(folder.write("b.yaml", resolved_text(one)));
+    EXPECT_EQ(resolved_text(again), resolved_text(one));
+  }
+
+  const auto refuses = [&](const std::string& more, int line, const std::string& message) {
+    try {
+      load(more);
+      ADD_FAILURE() << more << " was accepted";
+    } catch (const ConfigError& error) {
+      EXPECT_EQ(error.line, line) << error.what();
+      EXPECT_NE(std::string(error.what()).find(message), std::string::npos) << error.what();
+    }
+  };
+  refuses("plant: {arm: {extensible: maybe}}\n", 7,
+          "plant.arm.extensible: expected false, true or");
+  refuses("plant: {arm: {extensible: [1, 0]}}\n", 7, "plant.arm.extensible");
+  refuses("plant: {arm: {extensible: [1, 0, 2]}}\n", 7, "plant.arm.extensible");
+  refuses("plant: {kind: links, arm: {extensible: true}}\n", 7, "for kind links");
+  refuses("plant: {arm: {extensible: true, actuation_model: couple}}\n", 7,
+          "false with actuation_model: couple");
+  refuses(
+      "plant: {actuation: {chambers: {angle_rad: [0, 2, 4], gain_nm_per_bar: 1, offset_m: 0}}}\n",
+      7, "offset_m");
+  // The controller has no third coordinate: not for run, not for the daemon.
+  std::string controlled = kChambers;
+  controlled.insert(controlled.find("{segments: 3") + 1, "extensible: true, ");
+  try {
+    load_experiment(folder.write("c.yaml", controlled));
+    ADD_FAILURE() << "accepted";
+  } catch (const ConfigError& error) {
+    EXPECT_EQ(error.line, 2);
+    EXPECT_EQ(error.key, "arm.extensible");
+    EXPECT_NE(error.expected.find("the controller has no segments that stretch"),
+              std::string::npos);
+  }
+}
+
 }  // namespace
 }  // namespace softarm

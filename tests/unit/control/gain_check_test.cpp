@@ -7,12 +7,15 @@
 #include <complex>
 #include <deque>
 
+#include "control/sampled_loop.hpp"
+#include "softarm/model/dynamics.hpp"
 #include "softarm/model/statics.hpp"
 #include "unit/control/arms.hpp"
 
 namespace softarm {
 namespace {
 
+using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 /// Fast enough to be as good as continuous.
@@ -136,6 +139,37 @@ TEST(GainCheck, ANarrowFilterLeavesLessWhereNothingElseIsSlow) {
   const double narrow = limit(test::paper_arm(3), sampling);
   sampling.filter_bandwidth_radps = 300.0;
   EXPECT_GT(limit(test::paper_arm(3), sampling), 1.5 * narrow);
+}
+
+/// Half of the modes of a long arm, the slowest and the fastest ones, against all of them.
+TEST(GainCheck, ALongArmIsJudgedByItsExtremeModes) {
+  constexpr int kSegments = 32;
+  const ArmParameters arm = test::paper_arm(kSegments);
+  const VectorXd straight = VectorXd::Zero(arm.dof());
+  DynamicsWorkspace workspace(arm);
+  MatrixXd B(arm.dof(), arm.dof());
+  inertia_matrix(arm, workspace, straight, B);
+  const MatrixXd slope = gravity_slope(arm, straight);
+  const auto plane_of = [&](const MatrixXd& matrix) {
+    return MatrixXd(matrix(Eigen::seq(0, Eigen::last, 2), Eigen::seq(0, Eigen::last, 2)));
+  };
+  const MatrixXd one = MatrixXd::Identity(kSegments, kSegments);
+  BendingPlane all{plane_of(B).inverse(),
+                   plane_of(slope),
+                   arm.segments[0].stiffness_nm_per_rad * one,
+                   arm.segments[0].damping_nms_per_rad * one,
+                   one,
+                   0.01 * one};
+  const BendingPlane few = reduced(all, 16);
+  int stable = 0, unstable = 0;
+  for (double factor = 1e-3; factor < 2e3; factor *= 3.0) {
+    const double growth = loop_growth_1ps(all, realistic(), factor, true);
+    const double expected = loop_growth_1ps(few, realistic(), factor, true);
+    EXPECT_NEAR(growth, expected, 0.02 * std::abs(growth) + 0.02) << factor;
+    ++(growth < 0.0 ? stable : unstable);
+  }
+  EXPECT_GT(stable, 1);
+  EXPECT_GT(unstable, 1);
 }
 
 TEST(GainCheck, HasNothingToSayWithoutGains) {

@@ -214,6 +214,24 @@ TEST(TaskSpace, LateMeasurementsDoNotMatterToAnArmThatFollows) {
   }
 }
 
+/// The inverse of the valve lag differentiates the reference over a few hundredths of a second about
+/// now: without the jerk it would miss the lag of B u'', and the faster the path the more.
+TEST(TaskSpace, TheReferenceIsKnownAheadWithItsJerk) {
+  TipPathReference circle{
+      TipPathShape::circle, {0.0, 0.0, -0.7}, {0.2, 0.0, 0.0}, {0.0, 0.2, 0.0}, 3.0};
+  ExactArm arm(long_arm(), only(circle), settings(4, 10.0, 20.0));
+  arm.start(VectorXd::Constant(8, 0.4));
+  arm.run(6.0);
+  ReferenceSample ahead;
+  arm.reference().sample(arm.time_s() + 0.03, ahead);
+  const VectorXd now = arm.now().acceleration;
+  arm.run(0.03);
+  const double change = (arm.now().acceleration - now).norm();
+  EXPECT_GT(change, 0.1);
+  EXPECT_LT((ahead.acceleration - arm.now().acceleration).norm(), 0.15 * change);
+  EXPECT_LT((ahead.u - arm.now().u).norm(), 1e-5);
+}
+
 TEST(TaskSpace, PassesTheStraightPoseAndStartsFromIt) {
   // Down the axis of the hanging arm to full length and up again on the other side.
   for (int n : {2, 4}) {
@@ -353,6 +371,9 @@ TEST(TaskSpace, RefusesWhatItCannotUse) {
                std::invalid_argument);
   EXPECT_THROW(Reference(only(TipPathReference{}), settings(4, 10.0, -1.0), long_arm()),
                std::invalid_argument);
+  ControllerSettings negative = settings(4, 10.0, 20.0);
+  negative.task_space.map_rate_1ps = -1.0;
+  EXPECT_THROW(Reference(only(TipPathReference{}), negative, long_arm()), std::invalid_argument);
   EXPECT_THROW(Reference(only(point({0.0, std::numeric_limits<double>::quiet_NaN(), 0.0})),
                          settings(4, 10.0, 20.0), long_arm()),
                std::invalid_argument);

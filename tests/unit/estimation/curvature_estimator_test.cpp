@@ -149,6 +149,74 @@ TEST(CurvatureEstimator, ResidualsTellTwistAndLength) {
   EXPECT_NEAR(estimate.length_error_m[0], 0.005 * std::sin(0.65) / 0.65, 1e-15);
 }
 
+TEST(CurvatureEstimator, LengthIsMeasuredByTheChord) {
+  const ArmParameters configured = arm_of(2);
+  ArmParameters stretched = configured;
+  stretched.segments[0].length_m = 0.137;
+  stretched.segments[1].length_m = 0.081;
+  for (const CurvatureMethod method : {CurvatureMethod::pose, CurvatureMethod::orientation}) {
+    const CurvatureEstimator estimator = estimator_of(method, configured);
+    for (const double theta : {0.0, 1e-9, 1e-3, 0.4, 1.5, 3.0, 3.15, 4.7, 6.0, 6.2}) {
+      Eigen::VectorXd u(4);
+      u << bend(0.7, theta), bend(-2.0, 0.5 * theta);
+      CurvatureEstimate estimate;
+      estimator.estimate(frame_of(stretched, u, test::some_base()), estimate);
+      ASSERT_TRUE(estimate.valid[0] && estimate.valid[1]);
+      // Near 2 pi the chord vanishes, and with it what it knows of the length.
+      const double c1 = theta > 0.0 ? std::sin(theta / 2) / (theta / 2) : 1.0;
+      EXPECT_NEAR(estimate.length_m[0], 0.137, 4e-15 / (c1 * c1)) << theta;
+      EXPECT_NEAR(estimate.length_m[1], 0.081, 4e-15) << theta;
+      EXPECT_NEAR((estimate.u_rad.head<2>() - bend(0.7, theta)).norm(), 0.0, 1e-13);
+      EXPECT_TRUE(std::isfinite(estimate.length_variance_m2[0]));
+    }
+  }
+  // Inertial sensors see no length.
+  MocapFrame frame = frame_of(stretched, Eigen::VectorXd::Constant(4, 0.3));
+  for (BodyPose& body : frame.body) body.position_m.setZero();
+  CurvatureEstimate estimate;
+  estimator_of(CurvatureMethod::orientation, configured).estimate(frame, estimate);
+  ASSERT_TRUE(estimate.valid[0]);
+  EXPECT_EQ(estimate.length_m[0], 0.0);
+  EXPECT_TRUE(std::isinf(estimate.length_variance_m2[0]));
+}
+
+TEST(CurvatureEstimator, LengthIsAsNoisyAsReported) {
+  // 0.2 mm of relative position, 3.5 mrad a body; the sizes to expect from the closed form.
+  constexpr double kSigma_m = 0.2e-3 / std::numbers::sqrt2, kSigma_rad = 3.5e-3;
+  constexpr double kLength_m = 0.12;
+  const std::vector<BodyNoise> noise(2, {kSigma_m, kSigma_rad});
+  const CurvatureEstimator estimator =
+      estimator_of(CurvatureMethod::pose, arm_of(1, kLength_m), noise);
+  std::mt19937 random(1);
+  for (const auto& [theta, expected_mm] :
+       {std::pair{0.0, 0.200}, std::pair{0.4, 0.202}, std::pair{pi / 2, 0.226},
+        std::pair{pi, 0.333}, std::pair{4.7, 0.719}}) {
+    constexpr int kDraws = 20000;
+    const Eigen::Isometry3d end = arc_end(kLength_m, 0.3, theta);
+    double sum = 0.0, squares = 0.0, mixed = 0.0, variance = 0.0, covariance = 0.0;
+    for (int k = 0; k < kDraws; ++k) {
+      const auto upper =
+          test::disturbed(body_at(Eigen::Isometry3d::Identity()), kSigma_m, kSigma_rad, random);
+      const auto lower = test::disturbed(body_at(end), kSigma_m, kSigma_rad, random);
+      const SegmentCurvature one = estimator.segment(0, upper, lower);
+      ASSERT_TRUE(one.valid);
+      const double error = one.length_m - kLength_m;
+      sum += error;
+      squares += error * error;
+      mixed += error * (one.u_rad.dot(bend(0.3, 1.0)) - theta);
+      variance += one.length_variance_m2 / kDraws;
+      covariance += one.length_covariance_m_rad / kDraws;
+    }
+    const double sigma = std::sqrt(squares / kDraws);
+    EXPECT_NEAR(std::sqrt(variance) / sigma, 1.0, 0.02) << theta;  // 0.5 % by chance
+    EXPECT_NEAR(1e3 * std::sqrt(variance), expected_mm, 0.002 + 0.01 * expected_mm) << theta;
+    EXPECT_LT(std::abs(sum / kDraws), 0.1 * sigma) << theta;
+    if (theta > 0.3) {
+      EXPECT_NEAR(mixed / kDraws, covariance, 0.05 * std::abs(covariance) + 2e-8) << theta;
+    }
+  }
+}
+
 TEST(CurvatureEstimator, WhatHasNoBendIsNotValid) {
   const CurvatureEstimator estimator = estimator_of(CurvatureMethod::pose, arm_of(1));
   const BodyPose base = body_at(Eigen::Isometry3d::Identity());

@@ -272,6 +272,40 @@ TEST(Extensible, PointMassesAreAsSingularAsTheirOwnColumns) {
   }
 }
 
+TEST(Extensible, SegmentsOfConstantLengthKeepIt) {
+  // Taking e out of the equations is taking its row and column out.
+  RandomArm random(9);
+  for (const MassModel mass : {MassModel::point, MassModel::distributed}) {
+    for (int k = 0; k < 40; ++k) {
+      const int n = 1 + k % 4;
+      ArmParameters arm = random.arm(n, {mass, true});
+      State s = random.state(arm, 2.0);
+      std::vector<int> kept;
+      for (int i = 0; i < n; ++i) {
+        SegmentParameters& segment = arm.segments[static_cast<std::size_t>(i)];
+        segment.constant_length = random.uniform(0.0, 1.0) < 0.5;
+        if (segment.constant_length) s.u(3 * i + 2) = s.v(3 * i + 2) = 0.0;
+        for (int c = 0; c < (segment.constant_length ? 2 : 3); ++c) kept.push_back(3 * i + c);
+      }
+      const Eigen::VectorXd force = random.vector(3 * n, 0.5);
+      DynamicsWorkspace workspace(arm);
+      Eigen::VectorXd got(3 * n), bias(3 * n), want(kept.size());
+      ASSERT_TRUE(forward_dynamics(arm, workspace, s.u, s.v, force, got));
+      Eigen::MatrixXd B(3 * n, 3 * n), C(3 * n, 3 * n);
+      dynamics_matrices(arm, workspace, s.u, s.v, B, C, bias);
+      bias += C * s.v;
+      add_impedance(arm, s.u, s.v, bias);
+      want = B(kept, kept).ldlt().solve((force - bias)(kept));
+      EXPECT_LE((got(kept) - want).cwiseAbs().maxCoeff(), 1e-8 * want.cwiseAbs().maxCoeff());
+      for (int i = 0; i < n; ++i) {
+        if (arm.segments[static_cast<std::size_t>(i)].constant_length) {
+          EXPECT_EQ(got(3 * i + 2), 0.0);
+        }
+      }
+    }
+  }
+}
+
 TEST(Extensible, WhatHasNoFormIsRefused) {
   RandomArm random(7);
   ArmParameters arm = random.arm(2, {MassModel::point, true});

@@ -92,7 +92,7 @@ TEST_F(WrittenLog, AFullDiskIsAnError) {
   ExperimentLog log(folder_, experiment_);
   log.add(LogRow{});
   EXPECT_THROW(log.close(), std::runtime_error);
-  EXPECT_THROW(write_text("/dev/full", "text"), std::runtime_error);
+  EXPECT_THROW(write_text("/dev/full", "text", {}), std::runtime_error);
 }
 
 TEST(TimingReport, HasQuantilesAndCounts) {

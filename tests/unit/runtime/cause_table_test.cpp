@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <ostream>
 #include <string>
@@ -38,7 +39,7 @@ class Bench {
     const Mode mode = monitor.step(input);
     if (limit) limit->note(input.now_ns, last_mode, input.requests.arm, monitor);
     input.requests.arm = input.requests.disarm = input.requests.emergency_stop =
-        input.sender_restarted = false;
+        input.requests.lost = input.sender_restarted = false;
     // Pressure is there after a while under control, and gone after a while of venting.
     ticks_in_mode = mode == last_mode ? ticks_in_mode + 1 : 0;
     last_mode = mode;
@@ -104,13 +105,23 @@ const std::vector<Row>& rows() {
       {Reason::curvature_mismatch, Mode::fault, Clearance::disarm_then_arm, false, 1,
        [](Bench& b) { b.input.curvature_mismatch = true; },
        [](Bench& b) { b.input.curvature_mismatch = false; }},
+      {Reason::length_mismatch, Mode::fault, Clearance::disarm_then_arm, true, 1,
+       [](Bench& b) { b.input.length_mismatch = true; },
+       [](Bench& b) { b.input.length_mismatch = false; }},
       {Reason::disarmed, Mode::vent, Clearance::arm, false, 1,
        [](Bench& b) { b.input.requests.disarm = true; }, nothing},
       {Reason::deadman_released, Mode::vent, Clearance::arm, false, 102,
        [](Bench& b) { b.go = false; }, [](Bench& b) { b.go = true; }},
+      {Reason::requests_lost, Mode::vent, Clearance::arm, false, 1,
+       [](Bench& b) { b.input.requests.lost = true; }, nothing},
+      {Reason::foreign_commands, Mode::vent, Clearance::arm, false, 1,
+       [](Bench& b) { b.input.newest_foreign_ns = b.input.now_ns; },
+       [](Bench& b) { b.input.newest_foreign_ns = kNever; }},
       {Reason::soft_limit, Mode::vent, Clearance::arm, false, 1,
        [](Bench& b) { b.input.soft_limit_exceeded = true; },
        [](Bench& b) { b.input.soft_limit_exceeded = false; }},
+      {Reason::oscillation, Mode::vent, Clearance::arm, false, 1,
+       [](Bench& b) { b.input.oscillation = true; }, [](Bench& b) { b.input.oscillation = false; }},
       {Reason::time_gap, Mode::vent, Clearance::good_frames, false, 1,
        [](Bench& b) { b.gap_ns = 150 * kMs; }, nothing},
       {Reason::command_expired, Mode::vent, Clearance::good_frames, false, 1,
@@ -171,7 +182,7 @@ TEST_P(CauseTable, ItKeepsTheArmFromBecomingActive) {
   ASSERT_EQ(bench.monitor.mode(), Mode::wait_frames);
   row.cause(bench);
   const bool lasts = row.reason != Reason::time_gap && row.reason != Reason::sender_restarted &&
-                     row.reason != Reason::disarmed;
+                     row.reason != Reason::disarmed && row.reason != Reason::requests_lost;
   const bool latches =
       row.reason == Reason::shutdown || (row.mode == Mode::fault && !row.pressurised);
   for (int k = 0; k < 400; ++k) {  // longer than what queued up in a stop counts for nothing
@@ -186,7 +197,7 @@ TEST_P(CauseTable, ItKeepsTheArmFromBecomingActive) {
   if (latches) {
     EXPECT_EQ(bench.monitor.mode(), row.mode);
   }
-  if (!lasts && row.reason != Reason::disarmed) {
+  if (!lasts && row.clearance != Clearance::arm) {
     EXPECT_EQ(bench.monitor.mode(), Mode::active);
   }
 }
@@ -382,8 +393,9 @@ TEST(Waiting, AVentedArmWaitsForAnArmOnlyWhereNothingElseHoldsIt) {
 
 TEST(CauseTableInCode, TheMoreSevereComeFirst) {
   const auto rules = cause_table();
-  EXPECT_EQ(rules.front().reason, Reason::shutdown);
-  for (std::size_t k = 2; k < rules.size(); ++k) {
+  EXPECT_EQ(rules[0].reason, Reason::emergency_stop);
+  EXPECT_EQ(rules[1].reason, Reason::shutdown);
+  for (std::size_t k = 3; k < rules.size(); ++k) {
     EXPECT_LE(rules[k].demands, rules[k - 1].demands) << name(rules[k].reason);
     if (rules[k].demands == rules[k - 1].demands) {
       EXPECT_LE(rules[k].clearance, rules[k - 1].clearance) << name(rules[k].reason);
@@ -401,6 +413,75 @@ TEST(CauseTableInCode, AnEmergencyStopIsReportedEvenAfterAnotherFault) {
   EXPECT_EQ(bench.monitor.reason(), Reason::emergency_stop);
   bench.input.requests.disarm = bench.input.requests.emergency_stop = true;
   EXPECT_EQ(bench.tick(), Mode::fault) << "of two requests the stop wins";
+}
+
+TEST(CauseTableInCode, AnEmergencyStopIsReportedDuringAShutdownAndKept) {
+  Bench bench(Arming::automatic);
+  bench.activate();
+  bench.input.requests.shutdown = true;
+  ASSERT_EQ(bench.tick(), Mode::vent);
+  bench.input.requests.emergency_stop = true;
+  EXPECT_EQ(bench.tick(), Mode::fault);
+  EXPECT_EQ(bench.monitor.reason(), Reason::emergency_stop);
+  EXPECT_EQ(bench.run(200), Mode::fault);
+  bench.input.requests.disarm = true;
+  EXPECT_EQ(bench.run(200), Mode::fault) << "too late";
+  EXPECT_EQ(bench.monitor.reason(), Reason::emergency_stop);
+}
+
+// An `arm` that does not lead to ACTIVE at once.
+TEST(PendingArm, IsTakenBackByEveryCauseAndByTime) {
+  const auto waiting = [] {
+    auto bench = std::make_unique<Bench>(Arming::explicit_);
+    bench->run(kGoodFrames / 2);
+    bench->input.requests.arm = true;
+    EXPECT_EQ(bench->tick(), Mode::wait_frames);
+    EXPECT_TRUE(bench->monitor.armed());
+    return bench;
+  };
+  EXPECT_EQ(waiting()->run(kGoodFrames), Mode::active);
+  for (const Row& row : rows()) {
+    if (row.pressurised || row.clearance == Clearance::never) continue;
+    SCOPED_TRACE(name(row.reason));
+    const auto bench = waiting();
+    // Only what comes later than the run of good frames is awaited.
+    if (row.after_ticks > 1) bench->input.bad_frames = 1;
+    row.cause(*bench);
+    bench->run(row.after_ticks);
+    EXPECT_FALSE(bench->monitor.armed());
+    bench->input.bad_frames = 0;
+    row.remove(*bench);
+    EXPECT_NE(bench->run(400), Mode::active);
+  }
+  const auto bench = waiting();
+  bench->input.bad_frames = 1;  // every other frame is refused: no cause, and no run of good ones
+  bench->run(1000);
+  EXPECT_TRUE(bench->monitor.armed()) << "2 s";
+  bench->run(500);
+  EXPECT_FALSE(bench->monitor.armed()) << "3 s";
+  bench->input.bad_frames = 0;
+  EXPECT_NE(bench->run(400), Mode::active);
+}
+
+TEST(PendingArm, IsRefusedUnderACauseThatOnlyHolds) {
+  Bench bench(Arming::explicit_);
+  bench.run(kGoodFrames + 1);
+  bench.input.poses_frozen = bench.input.requests.arm = true;
+  bench.tick();
+  EXPECT_FALSE(bench.monitor.armed());
+  bench.input.poses_frozen = false;
+  EXPECT_NE(bench.run(400), Mode::active);
+}
+
+TEST(PendingArm, InHoldTheArmStaysArmed) {
+  Bench bench(Arming::explicit_);
+  bench.activate();
+  bench.input.poses_frozen = true;
+  EXPECT_EQ(bench.run(3000), Mode::hold);
+  bench.input.requests.arm = true;
+  bench.tick();
+  bench.input.poses_frozen = false;
+  EXPECT_EQ(bench.run(100), Mode::active);
 }
 
 TEST(CauseTableInCode, AFaultIsNotAcknowledgedWhileItLasts) {

@@ -282,6 +282,28 @@ TEST_F(Pipeline, AGapInTimeVentsAndForgetsWhatWasQueued) {
   EXPECT_EQ(bench.pipeline.counters().accepted, accepted);
 }
 
+// The machine was suspended: no time has passed on its clock, but for everything else it has.
+TEST_F(Pipeline, APauseOfTheClockVentsForgetsTheCommandAndWhatWasQueued) {
+  Experiment explicitly = experiment;
+  explicitly.safety.arming = Arming::explicit_;
+  PipelineBench bench(explicitly);
+  bench.run(200);
+  bench.input.requests.arm = true;
+  ASSERT_GT(bench.run_to(Mode::active), 0);
+  bench.run(500);
+  ASSERT_GT(bench.pipeline.output().pressure_bar.maxCoeff(), 0.1);
+  const std::int64_t accepted = bench.pipeline.counters().accepted;
+  bench.input.paused = true;
+  bench.tick();
+  bench.input.paused = false;
+  EXPECT_EQ(bench.pipeline.output().mode, Mode::vent);
+  EXPECT_EQ(bench.pipeline.output().reason, Reason::time_gap);
+  EXPECT_TRUE(bench.pipeline.output().pressure_bar.isZero());
+  EXPECT_EQ(bench.pipeline.counters().accepted, accepted);
+  EXPECT_EQ(bench.run_to(Mode::active), -1);
+  EXPECT_FALSE(bench.pipeline.output().armed);
+}
+
 // The valves vent while we are held up: what was commanded before is nothing to go on from.
 TEST_F(Pipeline, AfterAStallPressuresRiseFromZeroWithinTheSlew) {
   Experiment slow = experiment;

@@ -10,7 +10,8 @@ namespace softarm::test {
 
 class RandomFaults {
  public:
-  RandomFaults(PipelineBench& bench, unsigned seed) : bench_(bench), random_(seed) {}
+  RandomFaults(PipelineBench& bench, unsigned seed)
+      : bench_(bench), random_(seed), others_(seed + 1000) {}
 
   void before_tick() {
     if (chance(0.005)) spell_ = std::uniform_int_distribution<int>(0, kKinds)(random_);
@@ -36,6 +37,9 @@ class RandomFaults {
     if (chance(0.002)) leaking_ = false;
     bench_.input.consecutive_overruns =
         chance(0.002) ? std::uniform_int_distribution<int>(1, 20)(random_) : 0;
+    std::bernoulli_distribution rarely(0.0001);
+    bench_.input.requests.lost = rarely(others_);
+    if (rarely(others_)) bench_.input.newest_foreign_ns = bench_.now_ns;
   }
 
   bool corrupt(MocapFrame& frame) {
@@ -97,7 +101,7 @@ class RandomFaults {
   }
 
   PipelineBench& bench_;
-  std::mt19937 random_;
+  std::mt19937 random_, others_;
   MocapFrame last_;
   int spell_ = 0;
   bool leaking_ = false;

@@ -25,6 +25,12 @@ inline PlantSettings paper_arm(MassModel mass = MassModel::distributed, int segm
   return settings;
 }
 
+/// The same with segments that stretch.
+inline PlantSettings stretching(PlantSettings settings) {
+  settings.arm.extensible = true;
+  return settings;
+}
+
 /// The built-in kinds with `parts` a segment, where they have parts.
 using MakeKind = PlantKind (*)(int parts);
 inline constexpr MakeKind kPcc = [](int) -> PlantKind { return PccSettings{}; };

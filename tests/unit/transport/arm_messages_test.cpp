@@ -61,7 +61,8 @@ TEST(ArmMessages, EveryFlagIsItsOwn) {
       {controller_status_t::SOFT_LIMIT, &ArmStatus::soft_limit},
       {controller_status_t::SHADOW, &ArmStatus::shadow},
       {controller_status_t::ARMED, &ArmStatus::armed},
-      {controller_status_t::BOUNDED, &ArmStatus::bounded}};
+      {controller_status_t::BOUNDED, &ArmStatus::bounded},
+      {controller_status_t::LENGTH, &ArmStatus::length_warning}};
   for (const auto& [flag, set] : flags) {
     auto message = example<controller_status_t>(1, 3);
     message.flags = flag;

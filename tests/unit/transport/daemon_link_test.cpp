@@ -40,12 +40,31 @@ class DaemonLinkOverUdp : public ::testing::Test {
   void SetUp() override {
     try {
       sender = std::make_unique<LcmNode>(transport.lcm.url);
-      link = std::make_unique<DaemonLink>(settings, transport,
-                                          Provenance{.version = "test", .build = "build"}, false);
+      link = make_link();
     } catch (const TransportError& error) {
       GTEST_SKIP() << error.what();
     }
   }
+
+  std::unique_ptr<DaemonLink> make_link() const {
+    return std::make_unique<DaemonLink>(settings, transport,
+                                        Provenance{.version = "test", .build = "build"}, false);
+  }
+
+  void ask(std::int64_t sequence, std::int8_t request, std::int64_t nonce) {
+    sender->publish(transport.lcm.operator_channel,
+                    operator_command_t{.sequence = sequence, .nonce = nonce, .request = request});
+  }
+  void ask(std::int64_t sequence, std::int8_t request) {
+    ask(sequence, request, link->nonce(now_ns));
+  }
+  void say(std::int64_t sequence, bool go, std::int64_t nonce) {
+    sender->publish(
+        transport.lcm.deadman_channel,
+        deadman_t{
+            .sequence = sequence, .nonce = nonce, .go = static_cast<std::int8_t>(go ? 1 : 0)});
+  }
+  void say(std::int64_t sequence, bool go) { say(sequence, go, link->nonce(now_ns)); }
 
   mocap_frame_t straight_frame(std::int64_t number) const {
     mocap_frame_t message{};
@@ -106,7 +125,8 @@ TEST_F(DaemonLinkOverUdp, TenThousandTicksAllocateNothing) {
   const LcmSettings& lcm = transport.lcm;
   pressure_measurement_t measurement = test::example<pressure_measurement_t>(3, 4);
   curvature_reference_t reference = test::example<curvature_reference_t>(3, 4);
-  operator_command_t operator_command{.sequence = 0, .request = operator_command_t::ARM};
+  operator_command_t operator_command{
+      .sequence = 0, .nonce = 0, .request = operator_command_t::ARM};
   const timing_t not_a_frame = test::example<timing_t>(0, 0);
   std::int64_t frames = 0, references = 0, active = 0, lost = 0;
   long allocated = 0, released = 0;
@@ -115,11 +135,13 @@ TEST_F(DaemonLinkOverUdp, TenThousandTicksAllocateNothing) {
   for (int k = 0; counted < kTicks; ++k) {
     sender->publish(lcm.mocap_channel, straight_frame(k));
     sender->publish(lcm.measurement_channel, measurement);
-    sender->publish(lcm.deadman_channel, deadman_t{.sequence = k, .go = 1});
+    sender->publish(lcm.deadman_channel,
+                    deadman_t{.sequence = k, .nonce = link->nonce(now_ns), .go = 1});
     if (k % 10 == 0) {
       reference.sequence = k;
       sender->publish(lcm.reference_channel, reference);
       operator_command.sequence = k + 1;
+      operator_command.nonce = link->nonce(now_ns);
       sender->publish(lcm.operator_channel, operator_command);
       sender->publish(lcm.mocap_channel, not_a_frame);
     }
@@ -214,60 +236,205 @@ TEST_F(DaemonLinkOverUdp, CapturesLieBetweenTheSendingAndNow) {
   }));
 }
 
-TEST_F(DaemonLinkOverUdp, ADisarmIsObeyedWhateverItsNumber) {
-  const auto request = [this](std::int64_t sequence, std::int8_t what) {
-    sender->publish(transport.lcm.operator_channel,
-                    operator_command_t{.sequence = sequence, .request = what});
-  };
-  request(1000, operator_command_t::ARM);
-  ASSERT_TRUE(collect_until([](const TickInput& input) { return input.requests.arm; }));
-  // Another person's machine, on which less time has passed.
-  request(10, operator_command_t::ARM);
-  request(11, operator_command_t::DISARM);
-  ASSERT_TRUE(collect_until([](const TickInput& input) {
-    EXPECT_FALSE(input.requests.arm) << "an older ARM is ignored";
-    return input.requests.disarm;
-  }));
-  request(1000, operator_command_t::ARM);
-  request(2000, operator_command_t::ARM);
-  int armed = 0;
-  ASSERT_TRUE(
-      collect_until([&](const TickInput& input) { return (armed += input.requests.arm) > 0; }));
+constexpr std::int8_t kArm = operator_command_t::ARM, kDisarm = operator_command_t::DISARM,
+                      kStop = operator_command_t::EMERGENCY_STOP;
+const auto arms = [](const TickInput& input) { return input.requests.arm; };
+const auto disarms = [](const TickInput& input) { return input.requests.disarm; };
+const auto stops = [](const TickInput& input) { return input.requests.emergency_stop; };
+
+// A key that was pressed before a disarm, and is repeated after it.
+TEST_F(DaemonLinkOverUdp, AnArmOlderThanADisarmOrStopIsRefused) {
+  ask(1000, kArm);
+  ASSERT_TRUE(collect_until(arms));
+  ask(1000, kArm);
+  ASSERT_TRUE(collect_until(arms)) << "the same key press";
+  std::int64_t latest = 1000;
+  for (const auto& [request, comes] : {std::pair{kDisarm, +disarms}, std::pair{kStop, +stops}}) {
+    // On a machine whose clock is behind.
+    ask(11, request);
+    ASSERT_TRUE(collect_until([&](const TickInput& input) {
+      EXPECT_EQ(input.requests.disarm, input.requests.disarm && request == kDisarm);
+      return comes(input);
+    }));
+    now_ns += 1'000'000;
+    ask(latest, kArm);
+    EXPECT_TRUE(nothing_comes(arms)) << "the key was pressed before";
+    ask(++latest, kArm);
+    ASSERT_TRUE(collect_until(arms)) << "again";
+  }
+  ask(latest + 10, kDisarm);
+  ASSERT_TRUE(collect_until(disarms));
+  ask(latest + 9, kArm);
+  EXPECT_TRUE(nothing_comes(arms)) << "pressed before, heard for the first time after it";
+  now_ns += 3'000'000'000;  // no key press lasts as long
+  ask(5, kArm);
+  EXPECT_TRUE(collect_until(arms)) << "of a machine whose clock is behind";
 }
 
-TEST_F(DaemonLinkOverUdp, AnEmergencyStopIsObeyedWhateverItsNumberAndIsNoDisarm) {
-  const auto request = [this](std::int64_t sequence, std::int8_t what) {
-    sender->publish(transport.lcm.operator_channel,
-                    operator_command_t{.sequence = sequence, .request = what});
+TEST_F(DaemonLinkOverUdp, AnArmMustEchoAStatusOfTheLastSecondSinceTheLastStop) {
+  const std::int64_t first = link->nonce(now_ns);
+  std::int64_t number = 0;
+  for (const std::int64_t nonce : {std::int64_t{0}, first + 1, first - 1'000'000, ~first}) {
+    ask(++number, kArm, nonce);
+    EXPECT_TRUE(nothing_comes(arms)) << nonce - first;
+  }
+  now_ns += 900'000'000;
+  ask(++number, kArm, first);
+  EXPECT_TRUE(collect_until(arms));
+  now_ns += 100'000'000;
+  ask(++number, kArm, first);
+  EXPECT_TRUE(nothing_comes(arms)) << "a second old";
+  // Whoever pressed the key had not heard of the disarm yet, whatever the number.
+  const std::int64_t before = link->nonce(now_ns);
+  now_ns += 1'000'000;
+  ask(++number, kDisarm, 0);
+  ASSERT_TRUE(collect_until(disarms));
+  ask(++number, kArm, before);
+  EXPECT_TRUE(nothing_comes(arms));
+  ask(++number, kArm, link->nonce(now_ns));
+  EXPECT_TRUE(collect_until(arms));
+  // Nor does the status of another run of the daemon count.
+  link = make_link();
+  ask(++number, kArm, before + 1'000'000);
+  EXPECT_TRUE(nothing_comes(arms));
+}
+
+TEST_F(DaemonLinkOverUdp, AnArmFromBeforeAVentIsRefused) {
+  ControlPipeline pipeline(settings);
+  LoopTiming timing;
+  const auto tick = [&] {
+    now_ns += pipeline.period_ns();
+    pipeline.tick(link->collect(now_ns));
+    link->publish_status(now_ns, pipeline, timing);
   };
-  request(1000, operator_command_t::ARM);
-  ASSERT_TRUE(collect_until([](const TickInput& input) { return input.requests.arm; }));
-  request(10, operator_command_t::EMERGENCY_STOP);
-  ASSERT_TRUE(collect_until([](const TickInput& input) {
+  tick();
+  const std::int64_t before = link->nonce(now_ns);
+  TickInput shut;
+  shut.now_ns = now_ns += pipeline.period_ns();
+  shut.requests.shutdown = true;  // any way into VENT
+  ASSERT_EQ(pipeline.tick(shut).mode, Mode::vent);
+  link->publish_status(now_ns, pipeline, timing);
+  ask(1, kArm, before);
+  EXPECT_TRUE(nothing_comes(arms));
+  ask(2, kArm, link->nonce(now_ns));
+  EXPECT_TRUE(collect_until(arms));
+}
+
+TEST_F(DaemonLinkOverUdp, OnlyADisarmOfSomebodyWhoSawTheFaultLeavesIt) {
+  ControlPipeline pipeline(settings);
+  LoopTiming timing;
+  const std::int64_t before = link->nonce(now_ns);
+  ask(1, 77, 0);  // nobody knows what that is
+  ASSERT_TRUE(collect_until(disarms));
+  ask(2, kStop, 0);
+  TickInput stopped;
+  ASSERT_TRUE(collect_until([&](const TickInput& input) {
+    stopped = input;
     EXPECT_FALSE(input.requests.disarm) << "a disarm would acknowledge the stop";
     return input.requests.emergency_stop;
   }));
-  request(11, 77);  // not a known request
-  ASSERT_TRUE(collect_until([](const TickInput& input) { return input.requests.disarm; }));
+  ASSERT_EQ(pipeline.tick(stopped).mode, Mode::fault);
+  link->publish_status(now_ns, pipeline, timing);
+  const std::int64_t fault = link->nonce(now_ns);
+  now_ns += 1'000'000;
+  for (const std::int64_t nonce : {std::int64_t{0}, before - 1'000}) {
+    ask(3, kDisarm, nonce);
+    EXPECT_TRUE(nothing_comes(disarms)) << nonce - before;
+  }
+  ask(4, 77, fault);
+  EXPECT_TRUE(nothing_comes(disarms)) << "an unknown request acknowledges nothing";
+  // Stopped again: a disarm that waited for the first stop does not acknowledge the second.
+  ask(5, kStop, 0);
+  ASSERT_TRUE(collect_until(stops));
+  ask(6, kDisarm, fault);
+  EXPECT_TRUE(nothing_comes(disarms));
+  ask(7, kDisarm, link->nonce(now_ns));
+  EXPECT_TRUE(collect_until(disarms));
+}
+
+// LCM keeps the oldest and drops the newest.
+TEST_F(DaemonLinkOverUdp, AFullQueueOfRequestsIsReportedAsLost) {
+  EXPECT_FALSE(link->collect(now_ns).requests.lost);
+  LcmNode listener(transport.lcm.url);
+  int sent = 0, heard = 0;
+  listener.subscribe(transport.lcm.operator_channel, 10'000,
+                     [&](const ReceivedMessage&) { ++heard; });
+  const std::int64_t end_ns = monotonic_now_ns() + kPatience_ns;
+  bool lost = false;
+  while (!lost && monotonic_now_ns() < end_ns) {
+    for (int k = 0; k < 200; ++k) ask(++sent, kArm, 0);
+    while (heard < sent && listener.wait_until(end_ns)) listener.drain(1000);
+    lost = link->collect(now_ns).requests.lost;
+  }
+  EXPECT_TRUE(lost);
 }
 
 TEST_F(DaemonLinkOverUdp, AGoIsHeardOnceANumberAndTakenBackAtOnce) {
-  const auto say = [this](std::int64_t sequence, bool go) {
-    sender->publish(transport.lcm.deadman_channel,
-                    deadman_t{.sequence = sequence, .go = static_cast<std::int8_t>(go)});
-  };
   const auto heard = [](const TickInput& input) { return input.newest_go_ns != kNever; };
   say(1, true);
   ASSERT_TRUE(collect_until(heard));
   const std::int64_t first_ns = link->collect(now_ns).newest_go_ns;
   now_ns += 1'000'000;
+  const auto again = [&](const TickInput& input) { return input.newest_go_ns != first_ns; };
   say(1, true);  // a buffer that is sent again and again
-  EXPECT_TRUE(
-      nothing_comes([&](const TickInput& input) { return input.newest_go_ns != first_ns; }));
+  EXPECT_TRUE(nothing_comes(again));
+  say(2, true, 0);
+  say(3, true, link->nonce(now_ns) - 1'000'000);
+  EXPECT_TRUE(nothing_comes(again)) << "a record that is played";
   say(2, true);
   ASSERT_TRUE(collect_until([&](const TickInput& input) { return input.newest_go_ns > first_ns; }));
-  say(3, false);
+  say(3, false, 0);
   ASSERT_TRUE(collect_until([&](const TickInput& input) { return !heard(input); }));
+}
+
+TEST_F(DaemonLinkOverUdp, OfTwoDeadMenTheOneThatReleasesWins) {
+  const auto heard = [](const TickInput& input) { return input.newest_go_ns != kNever; };
+  LcmNode listener(transport.lcm.url);
+  int count = 0;
+  listener.subscribe(transport.lcm.deadman_channel, 100, [&](const ReceivedMessage&) { ++count; });
+  say(1, true);
+  ASSERT_TRUE(collect_until(heard));
+  // All within one tick.
+  say(2, false);
+  say(1000, true);
+  const std::int64_t end_ns = monotonic_now_ns() + kPatience_ns;
+  while (count < 3 && listener.wait_until(end_ns)) {
+  }
+  EXPECT_TRUE(collect_until([&](const TickInput& input) { return !heard(input); }));
+}
+
+TEST_F(DaemonLinkOverUdp, CommandsOfOthersAreHeardAndOurOwnAreNot) {
+  const auto foreign = [](const TickInput& input) { return input.newest_foreign_ns != kNever; };
+  pressure_command_t heard{};
+  int count = 0;
+  sender->subscribe(transport.lcm.command_channel, 100, [&](const ReceivedMessage& packet) {
+    if (decode(packet.bytes, heard)) ++count;
+  });
+  TickOutput output;
+  output.pressure_bar = PressureVector::Constant(12, 0.5);
+  for (int k = 1; k <= 20; ++k) {
+    link->collect(now_ns += 1'000'000);
+    link->publish_command(now_ns, output);
+    const std::int64_t end_ns = monotonic_now_ns() + kPatience_ns;
+    while (count < k && sender->wait_until(end_ns)) {
+    }
+  }
+  ASSERT_EQ(count, 20);
+  EXPECT_TRUE(nothing_comes(foreign));
+  const auto send = [&] { sender->publish(transport.lcm.command_channel, heard); };
+  send();
+  EXPECT_TRUE(nothing_comes(foreign)) << "our own, repeated by the network";
+  heard.shadow = 1;
+  heard.sequence = 1000;
+  send();
+  EXPECT_TRUE(nothing_comes(foreign)) << "a shadow's";
+  sender->publish(transport.lcm.command_channel, test::example<timing_t>(0, 0));
+  EXPECT_TRUE(nothing_comes(foreign)) << "no command at all";
+  heard.shadow = 0;
+  heard.sequence = 20;
+  ++heard.time_us;
+  send();
+  EXPECT_TRUE(collect_until(foreign)) << "a number of ours, but another time";
 }
 
 TEST_F(DaemonLinkOverUdp, MeasuredPressuresArriveOnceAndOnlyIfTheyMakeSense) {

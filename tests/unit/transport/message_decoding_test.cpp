@@ -33,7 +33,7 @@ std::vector<LengthField> length_fields(const Message&) {
 std::vector<LengthField> length_fields(const mocap_frame_t&) { return {{24, 2}}; }
 std::vector<LengthField> length_fields(const pressure_command_t&) { return {{29, 2}}; }
 std::vector<LengthField> length_fields(const torque_command_t&) { return {{29, 2}}; }
-std::vector<LengthField> length_fields(const pressure_measurement_t&) { return {{24, 2}}; }
+std::vector<LengthField> length_fields(const pressure_measurement_t&) { return {{33, 2}}; }
 std::vector<LengthField> length_fields(const curvature_reference_t&) { return {{16, 2}}; }
 std::vector<LengthField> length_fields(const valves_status_t&) { return {{64, 2}}; }
 std::vector<LengthField> length_fields(const plant_state_t&) { return {{17, 2}, {19, 2}}; }
@@ -41,12 +41,12 @@ std::vector<LengthField> length_fields(const tick_record_t& record) {
   const auto lists = static_cast<std::size_t>(record.num_chambers + 3 * record.dimension);
   const auto bodies = static_cast<std::size_t>(record.frames.at(0).num_bodies);
   const auto measured = static_cast<std::size_t>(record.num_measured);
-  const std::size_t frame = 74 + 8 * lists + 4 * measured;
-  return {{66, 2}, {68, 2}, {70, 2}, {72, 2}, {frame + 16, 2}, {frame + 18 + 61 * bodies, 4}};
+  const std::size_t frame = 84 + 8 * lists + 4 * measured;
+  return {{76, 2}, {78, 2}, {80, 2}, {82, 2}, {frame + 16, 2}, {frame + 18 + 61 * bodies, 4}};
 }
 std::vector<LengthField> length_fields(const controller_status_t& status) {
-  const std::size_t counts = 48 + 4 + status.version.size() + 1 + 4 + 4 + 24 + 1;
-  return {{48, 4}, {counts, 2}, {counts + 2, 2}};
+  const std::size_t counts = 56 + 4 + status.version.size() + 1 + 4 + 4 + 24 + 1;
+  return {{56, 4}, {counts, 2}, {counts + 2, 2}};
 }
 
 std::int64_t get(const Bytes& bytes, const LengthField& field) {
@@ -144,7 +144,7 @@ TYPED_TEST(MessageDecoding, EveryWrongLengthIsRefused) {
 }
 
 // A text is its length, its letters and a byte 0: what ends otherwise, or holds another 0, would be
-// another text once it is encoded again.
+// another text once it is encoded again. Letters that a terminal obeys are refused too.
 TEST(MessageDecoding, TextsThatDoNotEndWhereTheySayAreRefused) {
   const auto refused = [](const auto& message, std::size_t length_at, std::size_t length) {
     const Bytes whole = encoded(message);
@@ -156,8 +156,10 @@ TEST(MessageDecoding, TextsThatDoNotEndWhereTheySayAreRefused) {
     EXPECT_FALSE(decode(endless, into));
     for (std::size_t k = 0; k < length; ++k) {
       Bytes broken = whole;
-      broken[length_at + 4 + k] = std::byte{0};
-      ASSERT_FALSE(decode(broken, into)) << k;
+      for (const int letter : {0, 1, 7, 10, 27, 127, 128, 155, 255}) {  // 27, 155: of terminals
+        broken[length_at + 4 + k] = static_cast<std::byte>(letter);
+        ASSERT_FALSE(decode(broken, into)) << k << ' ' << letter;
+      }
     }
   };
   const auto status = example<controller_status_t>(3, 4);

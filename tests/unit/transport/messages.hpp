@@ -88,6 +88,9 @@ template <>
 inline softarm_messages::pressure_measurement_t example(int segments, int chambers) {
   return {.sequence = -1,
           .time_us = 44,
+          .expired = 3,
+          .validity_us = 0,
+          .reason = 1,
           .num_chambers = static_cast<std::int16_t>(segments * chambers),
           .pressure_bar = numbers<float>(segments * chambers, 0.125)};
 }
@@ -103,18 +106,19 @@ inline softarm_messages::curvature_reference_t example(int segments, int /*chamb
 
 template <>
 inline softarm_messages::operator_command_t example(int /*segments*/, int /*chambers*/) {
-  return {.sequence = 99, .request = softarm_messages::operator_command_t::ARM};
+  return {.sequence = 99, .nonce = -98, .request = softarm_messages::operator_command_t::ARM};
 }
 
 template <>
 inline softarm_messages::deadman_t example(int /*segments*/, int /*chambers*/) {
-  return {.sequence = 100, .go = 1};
+  return {.sequence = 100, .nonce = -101, .go = 1};
 }
 
 template <>
 inline softarm_messages::controller_status_t example(int segments, int chambers) {
   softarm_messages::controller_status_t message{};
   message.tick = 17;
+  message.nonce = -18;
   message.version = "0.1.0 0123456789abcdef0123456789abcdef01234567-dirty";
   message.mode = 2;
   message.flags = 33;

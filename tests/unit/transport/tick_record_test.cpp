@@ -49,21 +49,24 @@ bool same_bits(const A& a, const B& b, std::size_t count) {
 
 void expect_same(const TickInput& a, const TickInput& b) {
   // A new field of TickInput stops the build here too: it belongs into this test.
-  const auto& [now_a, frames_a, reference_a, requests_a, expired_a, overruns_a, measurement_a,
-               measured_a, go_a] = a;
-  const auto& [now_b, frames_b, reference_b, requests_b, expired_b, overruns_b, measurement_b,
-               measured_b, go_b] = b;
-  const auto& [arm_a, disarm_a, stop_a, shutdown_a] = requests_a;
-  const auto& [arm_b, disarm_b, stop_b, shutdown_b] = requests_b;
+  const auto& [now_a, frames_a, reference_a, requests_a, expired_a, paused_a, overruns_a,
+               measurement_a, measured_a, go_a, foreign_a] = a;
+  const auto& [now_b, frames_b, reference_b, requests_b, expired_b, paused_b, overruns_b,
+               measurement_b, measured_b, go_b, foreign_b] = b;
+  const auto& [arm_a, disarm_a, stop_a, shutdown_a, lost_a] = requests_a;
+  const auto& [arm_b, disarm_b, stop_b, shutdown_b, lost_b] = requests_b;
   EXPECT_EQ(now_a, now_b);
   EXPECT_EQ(arm_a, arm_b);
   EXPECT_EQ(disarm_a, disarm_b);
   EXPECT_EQ(shutdown_a, shutdown_b);
   EXPECT_EQ(expired_a, expired_b);
+  EXPECT_EQ(paused_a, paused_b);
   EXPECT_EQ(overruns_a, overruns_b);
   EXPECT_EQ(measurement_a, measurement_b);
   EXPECT_EQ(stop_a, stop_b);
   EXPECT_EQ(go_a, go_b);
+  EXPECT_EQ(foreign_a, foreign_b);
+  EXPECT_EQ(lost_a, lost_b);
   ASSERT_EQ(measured_a == nullptr, measured_b == nullptr);
   if (measured_a != nullptr) {
     ASSERT_EQ(measured_a->size(), measured_b->size());
@@ -127,9 +130,12 @@ TEST(TickRecord, AnyInputComesBackBitForBit) {
       input.requests.disarm = k % 5 == 0;
       input.requests.shutdown = k % 7 == 0;
       input.command_expired = k % 11 == 0;
+      input.paused = k % 13 == 0;
       input.consecutive_overruns = static_cast<int>(any.random());
       input.newest_measurement_ns = any.integer();
       input.newest_go_ns = any.integer();
+      input.newest_foreign_ns = any.integer();
+      input.requests.lost = k % 13 == 0;
       input.requests.emergency_stop = k % 11 == 0;
       const PressureVector measured =
           PressureVector::Random(4 * segments).cast<float>().cast<double>();

@@ -12,7 +12,8 @@ namespace softarm::test {
 
 /// What is shared between a test and the back end that a driver owns.
 struct FakeHardware {
-  bool reachable = true, open = false, confirms = true, has_nan = false;
+  bool reachable = true, open = false, confirms = true, has_nan = false, ignores_writes = false,
+       keeps_failsafe = true;
   LinkResult secure_result = LinkResult::ok, write_result = LinkResult::ok,
              read_result = LinkResult::ok;
   std::vector<double> written_bar;  ///< the last set points that arrived
@@ -37,10 +38,11 @@ class FakeBackend : public ValveBackend {
     it_.calls.emplace_back("secure");
     return {it_.secure_result, it_.confirms};
   }
+  Secured check() noexcept override { return {LinkResult::ok, it_.keeps_failsafe}; }
   LinkResult write(const Eigen::VectorXd& set_points_bar) noexcept override {
     it_.calls.emplace_back("write");
     it_.during_write();
-    it_.written_bar.assign(set_points_bar.begin(), set_points_bar.end());
+    if (!it_.ignores_writes) it_.written_bar.assign(set_points_bar.begin(), set_points_bar.end());
     return it_.write_result;
   }
   LinkResult read(ReadBack& read_back) noexcept override {

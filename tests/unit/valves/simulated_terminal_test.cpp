@@ -75,10 +75,12 @@ TEST(Terminal, OffersItsBlocksAndNothingElse) {
   EXPECT_EQ(terminal.timeout_s(), 0.0);
   terminal.registers()[46100] = 250;
   EXPECT_DOUBLE_EQ(terminal.timeout_s(), 0.25);
-  EXPECT_FALSE(terminal.take_served());
-  terminal.served(0, 0);
-  EXPECT_TRUE(terminal.take_served());
-  EXPECT_FALSE(terminal.take_served());
+  EXPECT_FALSE(terminal.take_written());
+  terminal.served(45395, 0);
+  EXPECT_FALSE(terminal.take_written()) << "read only";
+  terminal.served(40003, 3);
+  EXPECT_TRUE(terminal.take_written());
+  EXPECT_FALSE(terminal.take_written());
 }
 
 }  // namespace

@@ -39,27 +39,53 @@ class Guard : public ::testing::Test {
     const ValveAction action = guard->next(now);
     if (action == ValveAction::connect) guard->connected(reachable, now);
     if (action == ValveAction::secure) guard->secured(secure_result, as_written, now);
-    if (action == ValveAction::exchange) {
-      written = guard->set_points_bar();
-      EXPECT_GE(written.minCoeff(), 0.0);
-      EXPECT_LE(written.maxCoeff(), settings.max_pressure_bar);
-      if (guard->state() != ValveState::running) {
-        EXPECT_TRUE(written.isZero());
-      }
-      if (result == LinkResult::ok) {
-        read_back.has_echo = true;
-        read_back.echo_bar = written;
-        read_back.actual_bar = written;
-        if (stuck_at >= 0) read_back.actual_bar[0] = stuck_at;
-      }
-      guard->exchanged(result, read_back, now);
-    }
+    if (action == ValveAction::exchange) exchange(result);
     return action;
+  }
+  void exchange(LinkResult result) {
+    if (result == LinkResult::ok) {
+      read_back.has_echo = has_echo;
+      read_back.echo_bar = held;
+      read_back.actual_bar = held;
+      if (stuck_at >= 0) read_back.actual_bar[0] = stuck_at;
+    }
+    if (guard->may_read()) guard->measured(result, read_back, now);
+    if (guard->failsafe_due(now)) {
+      ++failsafe_checks;
+      if (guard->failsafe_lost() && takes_failsafe) failsafe_is_set = true;
+      guard->failsafe_checked(LinkResult::ok, failsafe_is_set, now);
+    }
+    if (!guard->may_write()) return;
+    const Eigen::VectorXd before = written;
+    written = guard->set_points_bar();
+    EXPECT_GE(written.minCoeff(), 0.0);
+    EXPECT_LE(written.maxCoeff(), settings.max_pressure_bar);
+    if (guard->state() != ValveState::running) {
+      EXPECT_TRUE(written.isZero());
+    }
+    const double slew_bar = 2.0 * to_seconds(kPeriod) * settings.slew_bar_per_s;
+    EXPECT_LE((written - before).maxCoeff(), slew_bar + 1e-12) << "whoever commands it";
+    const LinkResult wrote = result == LinkResult::ok ? write_result : result;
+    if (wrote == LinkResult::ok && !ignores_writes) held = written;
+    guard->written(wrote, now);
   }
   /// Cycles until `state`, at most `limit`.
   bool reach(ValveState state, int limit = 2000) {
     for (int k = 0; k < limit && guard->state() != state; ++k) cycle();
     return guard->state() == state;
+  }
+  /// The back-off is as long as the terminal needs to vent, and is kept to the end.
+  void expect_silence(LinkResult result) {
+    int cycles = 0;
+    while (guard->state() != ValveState::disconnected) {
+      ASSERT_LE(++cycles, 42) << "0.2 s";
+      cycle(result);
+    }
+    EXPECT_EQ(guard->reason(), ValveReason::zero_unconfirmed);
+    const std::int64_t since = now;
+    while (cycle(result) == ValveAction::wait) {
+    }
+    EXPECT_GT(now - since, 300 * kMs);
   }
   void run() {
     commanding = true;
@@ -77,7 +103,11 @@ class Guard : public ::testing::Test {
   LinkResult secure_result = LinkResult::ok;
   double stuck_at = -1.0;
   ReadBack read_back{2};
-  Eigen::VectorXd written;
+  bool has_echo = true;
+  LinkResult write_result = LinkResult::ok;
+  bool ignores_writes = false, failsafe_is_set = true, takes_failsafe = true;
+  int failsafe_checks = 0;
+  Eigen::VectorXd written = Eigen::VectorXd::Zero(2), held = written;
 };
 
 TEST_F(Guard, WritesNoPressureBeforeTheTimeoutReadsBack) {
@@ -105,10 +135,14 @@ TEST_F(Guard, StartsWithZeroAndRisesGently) {
     before = written[1];
     cycle();
   }
-  wanted = {2.0, 0.0};  // once there, the controller's own limits hold
+  // Once there, the slew limit holds; towards zero there is none.
+  wanted = {2.0, 0.0};
+  before = written[0];
   cycle();
-  EXPECT_DOUBLE_EQ(written[0], 2.0);
   EXPECT_DOUBLE_EQ(written[1], 0.0);
+  EXPECT_DOUBLE_EQ(written[0], before + settings.slew_bar_per_s * 5e-3);
+  for (int k = 0; k < 20; ++k) cycle();
+  EXPECT_DOUBLE_EQ(written[0], 2.0);
 }
 
 TEST_F(Guard, ExpiryVentsInTheSameCycle) {
@@ -170,15 +204,204 @@ TEST_F(Guard, AFewLateAnswersAreTolerated) {
   EXPECT_TRUE(reach(ValveState::running));
 }
 
-TEST_F(Guard, ExceptionRepliesAreAnsweredWithZeroThenWithANewConnection) {
+TEST_F(Guard, ExceptionRepliesAreAnsweredWithZeroThenWithSilence) {
   run();
   for (int k = 0; k < 3; ++k) cycle(LinkResult::exception_reply);
   EXPECT_EQ(guard->state(), ValveState::degraded);
   EXPECT_EQ(cycle(LinkResult::exception_reply), ValveAction::exchange);
-  EXPECT_TRUE(written.isZero()) << "zero is offered as long as it answers";
-  for (int k = 0; k < 250 && guard->state() == ValveState::degraded; ++k)
-    cycle(LinkResult::exception_reply);
+  EXPECT_TRUE(written.isZero()) << "zero is offered for a while";
+  expect_silence(LinkResult::exception_reply);
+}
+
+// Writes refused, or taken and not carried out: 0.2 s after zero was first wanted nothing is sent
+// any more, for longer than the terminal's own time-out, and again after every new attempt.
+TEST_F(Guard, ATerminalThatTakesNoZeroIsLeftToVentByItself) {
+  for (const bool echo : {true, false}) {
+    has_echo = echo;
+    for (const bool refuses : {true, false}) {
+      SCOPED_TRACE(refuses ? "refuses" : "ignores");
+      write_result = LinkResult::ok;
+      ignores_writes = false;
+      held.setZero();
+      commanding = false;
+      make();
+      run();
+      if (refuses) write_result = LinkResult::exception_reply;
+      ignores_writes = !refuses;
+      if (refuses) {
+        for (int k = 0; k < 3; ++k) cycle();
+        ASSERT_EQ(guard->state(), ValveState::degraded);
+      } else {
+        commanding = false;
+        for (int k = 0; k < 25 && guard->state() == ValveState::running; ++k) cycle();
+        ASSERT_NE(guard->state(), ValveState::running);
+      }
+      expect_silence(LinkResult::ok);
+      commanding = true;
+      for (int round = 0; round < 3; ++round) {
+        ASSERT_TRUE(reach(ValveState::starting, 5000));
+        expect_silence(LinkResult::ok);
+      }
+      EXPECT_FALSE(guard->zero_confirmed());
+      held.setZero();  // its time-out
+      write_result = LinkResult::ok;
+      ignores_writes = false;
+      ASSERT_TRUE(reach(ValveState::vented, 5000));
+      for (int k = 0; k < 100; ++k) cycle();
+      EXPECT_EQ(guard->reason(), ValveReason::waiting_for_zero) << "somebody has to look first";
+    }
+  }
+}
+
+// An arm that empties slowly is not taken for one that does not.
+TEST_F(Guard, PressureThatHalvesWithinTheTerminalsTimeOutIsOnItsWay) {
+  run();
+  commanding = false;
+  while (written.maxCoeff() > 0.0) cycle();
+  for (stuck_at = 0.5; stuck_at > 0.1; stuck_at *= 0.98) {
+    cycle();
+    ASSERT_EQ(guard->state(), ValveState::vented) << stuck_at;
+    EXPECT_FALSE(guard->zero_confirmed());
+  }
+  cycle();
+  EXPECT_TRUE(guard->zero_confirmed());
+  for (stuck_at = 0.11; guard->state() == ValveState::vented; stuck_at *= 0.999) cycle();
+  EXPECT_EQ(guard->reason(), ValveReason::zero_unconfirmed);
+}
+
+TEST_F(Guard, SetPointsThatAreNotThoseWrittenDegradeAtOnce) {
+  run();
+  held[1] -= 0.002;  // another master, or a write that was lost
+  cycle();
+  EXPECT_TRUE(written.isZero());
+  EXPECT_EQ(guard->reason(), ValveReason::echo_mismatch);
+  EXPECT_EQ(guard->chamber(), 1);
+  EXPECT_TRUE(reach(ValveState::running));
+}
+
+// A pause that no clock counts: the terminal has vented, and its pressures are read first.
+TEST_F(Guard, ATerminalThatVentedWhileNobodyCountedIsNotFilledAgain) {
+  for (const bool echo : {true, false}) {
+    has_echo = echo;
+    make();
+    run();
+    held.setZero();
+    cycle();
+    EXPECT_TRUE(written.isZero());
+    EXPECT_EQ(guard->state(), ValveState::degraded);
+    EXPECT_EQ(guard->reason(), echo ? ValveReason::echo_mismatch : ValveReason::time_gap);
+    held.setZero();
+  }
+}
+
+TEST_F(Guard, AWriteWithoutAnAnswerMayHaveArrivedOrNot) {
+  run();
+  for (const bool arrived : {true, false}) {
+    wanted[0] += 0.05;
+    write_result = LinkResult::no_answer;
+    cycle();
+    if (arrived) held = written;
+    write_result = LinkResult::ok;
+    cycle();
+    EXPECT_EQ(guard->state(), ValveState::running) << arrived;
+  }
+}
+
+TEST_F(Guard, NoPressureIsWrittenWithoutAReadBackBeforeIt) {
+  run();
+  const Eigen::VectorXd before = written;
+  wanted[0] = 0.6;
+  cycle(LinkResult::no_answer);
+  EXPECT_EQ(written, before);
+  EXPECT_FALSE(guard->may_write());
+}
+
+TEST_F(Guard, APauseOfTheClockIsAGapAndEndsTheCommandInForce) {
+  run();
+  now += kPeriod;
+  EXPECT_FALSE(guard->wake(now, true));
+  EXPECT_EQ(guard->reason(), ValveReason::time_gap);
+  commanding = false;
+  cycle();
+  EXPECT_TRUE(written.isZero());
+  ASSERT_TRUE(reach(ValveState::vented));
+  for (int k = 0; k < 50; ++k) cycle();
+  EXPECT_EQ(guard->reason(), ValveReason::no_command);
+}
+
+TEST_F(Guard, ATimeOutThatAnotherMasterChangedIsFoundWithinASecondAndSetAgain) {
+  run();
+  for (int k = 0; k < 1000; ++k) cycle();
+  EXPECT_NEAR(failsafe_checks, 5, 2) << "once a second";
+  failsafe_is_set = false;
+  int cycles = 0;
+  while (guard->state() == ValveState::running) {
+    ASSERT_LT(++cycles, 202);
+    cycle();
+  }
+  EXPECT_EQ(guard->reason(), ValveReason::failsafe_changed);
+  EXPECT_TRUE(written.isZero()) << "in the same cycle";
+  cycle();
+  EXPECT_TRUE(failsafe_is_set);
+  ASSERT_TRUE(reach(ValveState::running));
+  takes_failsafe = false;
+  failsafe_is_set = false;
+  for (int k = 0; k < 205; ++k) cycle();
   EXPECT_EQ(guard->state(), ValveState::disconnected);
+  EXPECT_EQ(guard->reason(), ValveReason::failsafe_refused);
+}
+
+TEST_F(Guard, ASecondSenderVentsUntilOneHasLeftAndCommandsHaveBeenZero) {
+  run();
+  const auto intrude = [&](std::int64_t number) {
+    const std::array<double, 2> theirs{2.0, 2.0};
+    guard->command({.sequence = number, .validity_ns = 100 * kMs, .pressure_bar = theirs}, now);
+  };
+  const double before = written.maxCoeff();
+  intrude(sequence + 1'000'000);
+  now += kPeriod;
+  guard->wake(now);
+  ASSERT_EQ(guard->next(now), ValveAction::exchange);
+  exchange(LinkResult::ok);
+  EXPECT_LE(written.maxCoeff(), before + settings.slew_bar_per_s * 10e-3) << "one cycle at most";
+  cycle();  // with the next command of the first sender
+  EXPECT_EQ(guard->state(), ValveState::degraded);
+  EXPECT_EQ(guard->reason(), ValveReason::other_sender);
+  EXPECT_TRUE(written.isZero());
+  for (int k = 0; k < 200; ++k) {
+    intrude(sequence + 1'000'000 + k);
+    cycle();
+    ASSERT_TRUE(written.isZero()) << k;
+  }
+  EXPECT_GT(guard->counters().other_senders, 200);
+  ASSERT_TRUE(reach(ValveState::vented));
+  for (int k = 0; k < 200; ++k) cycle();
+  EXPECT_EQ(guard->reason(), ValveReason::waiting_for_zero);
+  wanted = {0.0, 0.0};
+  cycle();
+  wanted = {0.5, 1.0};
+  EXPECT_TRUE(reach(ValveState::running));
+}
+
+TEST_F(Guard, WithExplicitArmingPressureDoesNotReturnByItselfAfterAnExpiry) {
+  settings.wait_for_zero = true;
+  make();
+  commanding = true;
+  wanted = {0.0, 0.0};
+  ASSERT_TRUE(reach(ValveState::running));
+  wanted = {0.5, 1.0};
+  for (int k = 0; k < 100; ++k) cycle();
+  ASSERT_DOUBLE_EQ(written[1], 1.0);
+  commanding = false;  // lost on the way
+  for (int k = 0; k < 100; ++k) cycle();
+  EXPECT_EQ(guard->counters().times_vented, 1);
+  commanding = true;
+  for (int k = 0; k < 100; ++k) {
+    cycle();
+    ASSERT_TRUE(written.isZero()) << "silence of the network is no zero of the sender";
+  }
+  wanted = {0.0, 0.0};
+  cycle();
   EXPECT_TRUE(reach(ValveState::running));
 }
 
@@ -195,9 +418,10 @@ TEST_F(Guard, ABrokenConnectionIsTriedAgainWithGrowingPauses) {
       last = now;
     }
   }
-  EXPECT_NEAR(static_cast<double>(pauses[0]), 100.0 * kMs, kPeriod);
-  EXPECT_NEAR(static_cast<double>(pauses[1]), 200.0 * kMs, kPeriod);
-  EXPECT_NEAR(static_cast<double>(pauses[2]), 400.0 * kMs, kPeriod);
+  // The terminal's time-out is 0.2 s: in every pause it vents.
+  EXPECT_NEAR(static_cast<double>(pauses[0]), 320.0 * kMs, kPeriod);
+  EXPECT_NEAR(static_cast<double>(pauses[1]), 640.0 * kMs, kPeriod);
+  EXPECT_NEAR(static_cast<double>(pauses[2]), 1280.0 * kMs, kPeriod);
   EXPECT_NEAR(static_cast<double>(pauses[8]), 5000.0 * kMs, kPeriod) << "no longer than that";
   reachable = true;
   EXPECT_TRUE(reach(ValveState::running));
@@ -225,12 +449,15 @@ TEST_F(Guard, AStuckValveIsFoundAndStaysVentedUntilSomeoneLooked) {
   EXPECT_TRUE(reach(ValveState::running));
 }
 
-TEST_F(Guard, AValveThatDoesNotCloseStaysDegraded) {
+TEST_F(Guard, AValveThatDoesNotCloseNeverGetsPressureAgain) {
   run();
   stuck_at = 1.7;
   ASSERT_TRUE(reach(ValveState::degraded));
-  for (int k = 0; k < 2000; ++k) cycle();
-  EXPECT_EQ(guard->state(), ValveState::degraded);
+  for (int k = 0; k < 2000; ++k) {
+    cycle();
+    ASSERT_NE(guard->state(), ValveState::vented);
+    ASSERT_NE(guard->state(), ValveState::running);
+  }
 }
 
 TEST_F(Guard, AStuckValveMayBeReportedOnly) {
@@ -401,18 +628,24 @@ TEST_F(Guard, AStopIsZeroAndConfirmed) {
   EXPECT_FALSE(guard->zero_confirmed());
   cycle();
   EXPECT_TRUE(written.isZero());
+  EXPECT_FALSE(guard->zero_confirmed()) << "not yet measured";
+  cycle();
   EXPECT_TRUE(guard->zero_confirmed());
   EXPECT_EQ(guard->reason(), ValveReason::shutdown);
 }
 
-TEST_F(Guard, AStopThatIsNotReadBackIsNotConfirmed) {
+TEST_F(Guard, AStopIsNotConfirmedBeforeMeasuredPressureHasFallen) {
   run();
   guard->stop();
-  now += kPeriod;
-  guard->wake(now);
-  ASSERT_EQ(guard->next(now), ValveAction::exchange);
-  read_back.echo_bar.setConstant(0.5);  // as the terminal has it
-  guard->exchanged(LinkResult::ok, read_back, now);
+  stuck_at = 0.5;
+  for (int k = 0; k < 10; ++k) cycle();
+  EXPECT_TRUE(written.isZero());
+  EXPECT_FALSE(guard->zero_confirmed());
+  stuck_at = 0.05;
+  cycle();
+  EXPECT_TRUE(guard->zero_confirmed());
+  held[0] = 0.5;  // as the terminal has it
+  cycle();
   EXPECT_FALSE(guard->zero_confirmed());
 }
 
@@ -459,7 +692,10 @@ TEST_F(Guard, AllocatesNothing) {
     now += kPeriod;
     guard->wake(now);
     guard->next(now);
-    guard->exchanged(k % 7 == 0 ? LinkResult::no_answer : LinkResult::ok, read_back, now);
+    const LinkResult result = k % 7 == 0 ? LinkResult::no_answer : LinkResult::ok;
+    guard->measured(result, read_back, now);
+    if (guard->failsafe_due(now)) guard->failsafe_checked(LinkResult::ok, true, now);
+    guard->written(result, now);
   }
   EXPECT_EQ(test::allocations - before, 0);
 }

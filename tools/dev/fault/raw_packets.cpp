@@ -133,8 +133,8 @@ std::vector<SampleMessage> sample_messages(const LcmSettings& lcm, int segments,
   command.num_chambers = measured.num_chambers;
   command.pressure_bar = measured.pressure_bar;
   add(lcm.command_channel, command, kHash + 21, 4);
-  add(lcm.operator_channel, operator_command_t{.sequence = 1, .request = 0}, 0, 0);
-  add(lcm.deadman_channel, deadman_t{.sequence = 1, .go = 0}, 0, 0);
+  add(lcm.operator_channel, operator_command_t{.sequence = 1, .nonce = 0, .request = 0}, 0, 0);
+  add(lcm.deadman_channel, deadman_t{.sequence = 1, .nonce = 0, .go = 0}, 0, 0);
   return all;
 }
 

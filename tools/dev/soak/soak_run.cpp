@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <fstream>
 #include <numeric>
 
 #include "apps/program.hpp"
@@ -27,7 +26,7 @@ constexpr double kBurstFrom_bar = 0.5;
 
 std::filesystem::path write_soak_config(const SoakOptions& options) {
   const std::filesystem::path path = options.folder / "soak.yaml";
-  std::ofstream(path) << fmt::format(
+  const std::string text = fmt::format(
       "include: {}\nname: soak\nseed: {}\n"
       "reference: [{{kind: live, timeout_s: 1}}]\n"
       "daemon:\n"
@@ -38,6 +37,7 @@ std::filesystem::path write_soak_config(const SoakOptions& options) {
       "    valve_readback: true, valve_silence_s: 0.4, deadman_timeout_s: 1.5}}\n"
       "plant: {{mocap: {{rate_hz: 500}}}}\n",
       std::filesystem::absolute(options.config).string(), options.seed, 20000 + getpid() % 12000);
+  write_text(path, text, load_experiment(options.config).files);
   return path;
 }
 

@@ -24,14 +24,17 @@ Eigen::Vector2d bend(std::int64_t k) { return {0.3 * std::sin(0.1 * static_cast<
 class MotionLog : public ::testing::Test {
  protected:
   /// Per frame its set points, a hundredth of a bar times its number on the first chamber, then itself.
-  MotionLog() {
+  MotionLog() { bytes_ = log_with(0, 0); }
+  /// `stamp_us`: by which the logger's clock was set before frame 50; `gap_us`: that passed then.
+  std::string log_with(std::int64_t stamp_us, std::int64_t gap_us) const {
     const LcmSettings& lcm = experiment_.transport.lcm;
     const MocapAdapter adapter(experiment_.transport.bodies, experiment_.arm,
                                experiment_.transport.mocap);
     const auto sent = std::make_unique<SentFrame>();
     test::LogBytes log;
     for (std::int64_t k = 0; k < kFrames; ++k) {
-      const std::int64_t time_us = kStart_us + kFrame_us * k;
+      const std::int64_t own_us = kStart_us + kFrame_us * k + (k >= 50 ? gap_us : 0);
+      const std::int64_t time_us = own_us + (k >= 50 ? stamp_us : 0);
       softarm_messages::pressure_command_t command{};
       command.pressure_bar = {0.01F * static_cast<float>(k), 0.0F, 0.0F};
       command.num_chambers = 3;
@@ -45,11 +48,11 @@ class MotionLog : public ::testing::Test {
       frame.body[0] = {arm.base_position_m, Eigen::Quaterniond(arm.base_rotation), true};
       frame.body[1] = {end[0].translation(), Eigen::Quaterniond(end[0].linear()), true};
       softarm_messages::mocap_frame_t message;
-      adapter.to_sent(frame, time_us, *sent);
+      adapter.to_sent(frame, own_us, *sent);
       to_message(*sent, message);
       log.add_message(lcm.mocap_channel, message, time_us);
     }
-    bytes_ = log.bytes;
+    return log.bytes;
   }
 
   LoggedMotion read(const std::string& bytes, LoggedInput input = LoggedInput::commanded) const {
@@ -102,6 +105,52 @@ TEST_F(MotionLog, AStampThatIsNoTimeCostsItsMessageAlone) {
       EXPECT_EQ(read.record.input.time_s.size(), kFrames - (number == 40 ? 1 : 0));
       EXPECT_NE(read.damage.find("1 messages"), std::string::npos) << read.damage;
     }
+  }
+}
+
+/// The clock of the logger is set while it logs: the motion is that of the good log.
+TEST_F(MotionLog, AStepOfTheLoggersClockChangesNothing) {
+  const LoggedMotion good = read(bytes_);
+  for (const std::int64_t step_us : {-2'000'000LL, 2'000'000LL, -600'000'000LL,
+                                     31'536'000'000'000LL, -1'700'000'000'000'000LL}) {
+    const LoggedMotion set = read(log_with(step_us, 0));
+    ASSERT_EQ(set.record.time_s.size(), good.record.time_s.size()) << step_us;
+    EXPECT_LT((set.record.time_s - good.record.time_s).cwiseAbs().maxCoeff(), 1e-3) << step_us;
+    EXPECT_LT((set.record.input.time_s - good.record.input.time_s).cwiseAbs().maxCoeff(), 0.006);
+    EXPECT_EQ(set.damage, "") << step_us;
+    EXPECT_NE(set.notes.find("at byte"), std::string::npos) << set.notes;
+    expect_motion(set.record);
+  }
+}
+
+/// Nothing is logged for long: one part is used, and the other one is reported.
+TEST_F(MotionLog, AfterALongGapOnePartIsUsed) {
+  for (const std::int64_t gap_us : {60'000'000LL, 600'000'000LL, 86'400'000'000LL}) {
+    const LoggedMotion read = this->read(log_with(0, gap_us));
+    EXPECT_EQ(read.record.time_s.size(), 50);
+    const double span_s = read.record.time_s[read.record.time_s.size() - 1] - read.record.time_s[0];
+    EXPECT_NEAR(span_s, 49e-6 * kFrame_us, 1e-6);
+    EXPECT_NE(read.damage.find("the longest part"), std::string::npos) << read.damage;
+    EXPECT_NE(read.notes.find("nothing was logged for"), std::string::npos) << read.notes;
+  }
+}
+
+/// Two recordings in one file, as `cat` puts them together.
+TEST_F(MotionLog, AppendedRecordingsAreNotOneMotion) {
+  const LoggedMotion twice = read(bytes_ + log_with(0, 0));
+  EXPECT_EQ(twice.record.time_s.size(), kFrames);
+  EXPECT_NE(twice.damage.find("another recording"), std::string::npos) << twice.damage;
+}
+
+TEST_F(MotionLog, PressuresThatAreNoneAreNotUsed) {
+  std::string bytes = bytes_;
+  // The first pressure of a message, behind its channel, fingerprint, three integers, flag and size.
+  const std::size_t at = event(40) + 28 + experiment_.transport.lcm.command_channel.size() + 31;
+  for (const char* bad : {"\x7f\xc0\x00\x01", "\x7f\x80\x01\x01", "\x7e\x01\x01\x01"}) {
+    bytes.replace(at, 4, bad, 4);
+    const LoggedMotion read = this->read(bytes);
+    EXPECT_EQ(read.record.input.time_s.size(), kFrames - 1);
+    EXPECT_NE(read.damage, "");
   }
 }
 

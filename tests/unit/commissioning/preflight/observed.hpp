@@ -78,7 +78,9 @@ class Observer {
     for (const std::int64_t end_ns = now_ns_ + time_ns; now_ns_ < end_ns;) {
       now_ns_ += 5 * kMs;
       if (!command_bar_.empty())
-        arm_.command({++sequence_, 100 * kMs, false, command_bar_}, now_ns_);
+        arm_.command(
+            {.sequence = ++sequence_, .validity_ns = 100 * kMs, .pressure_bar = command_bar_},
+            now_ns_);
       arm_.advance_to(now_ns_);
       const auto n = static_cast<std::size_t>(truth_.arm.size());
       for (MocapFrame frame; arm_.receive(frame);)
