@@ -78,12 +78,14 @@ std::string shared_file(const std::string& name, const std::string& source) {
   return std::filesystem::exists(installed, error) ? installed.string() : source;
 }
 
-void say(const std::string& text) noexcept {
+void say(const std::string& text) noexcept { draw("", text); }
+
+void draw(std::string_view control, const std::string& text) noexcept {
   constexpr int kPatience_ms = 200;
   constexpr std::size_t kAtOnce = 512;  // a pipe that takes any takes as much
   static std::atomic<bool> stuck{false};
   try {
-    const std::string printed = printable(text);
+    const std::string printed = std::string(control) + printable(text);
     std::string_view left = printed;
     while (!left.empty()) {
       pollfd where{.fd = STDERR_FILENO, .events = POLLOUT, .revents = 0};

@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <functional>
 #include <string>
+#include <string_view>
 
 namespace softarm {
 
@@ -27,6 +28,9 @@ std::string shared_file(const std::string& name, const std::string& source);
 /// full disk, a closed pipe, a pipe that nobody reads) is lost: a program that moves an arm must
 /// neither end nor wait for that.
 void say(const std::string& text) noexcept;
+
+/// The same, behind characters that the terminal shall obey.
+void draw(std::string_view control, const std::string& text) noexcept;
 
 /// Accepts a finite time above zero, in s.
 CLI::Validator positive_seconds();

@@ -1,6 +1,5 @@
 #include "apps/progress.hpp"
 
-#include <fmt/format.h>
 #include <unistd.h>
 
 #include "apps/program.hpp"
@@ -17,7 +16,7 @@ constexpr long long kLinePeriod_ns = 5'000'000'000;
 Progress::Progress(bool always) : terminal_(isatty(STDERR_FILENO) != 0), always_(always) {}
 
 Progress::~Progress() {
-  if (terminal_) say("\r\033[K");
+  if (terminal_) draw("\r\033[K", "");
 }
 
 bool Progress::due() const {
@@ -28,7 +27,7 @@ bool Progress::due() const {
 void Progress::update(const std::string& text) {
   if (!due()) return;
   last_ns_ = monotonic_now_ns();
-  say(fmt::format("{}{}{}", terminal_ ? "\r\033[K" : "", text, terminal_ ? "" : "\n"));
+  draw(terminal_ ? "\r\033[K" : "", text + (terminal_ ? "" : "\n"));
 }
 
 }  // namespace softarm

@@ -133,7 +133,7 @@ RequestOutcome OperatorClient::request(OperatorRequest what, double patience_s) 
   const std::int64_t before = statuses_;
   std::int64_t next_ns = 0;
   std::optional<std::int64_t> nonce;
-  bool tried = false, sent = false;
+  bool sent = false;
   const auto heard = [&] { return sent && statuses_ > before; };
   const auto understood = [&] {
     if (heard() && shows(*status_, what)) return true;
@@ -141,16 +141,14 @@ RequestOutcome OperatorClient::request(OperatorRequest what, double patience_s) 
       nonce = status_->nonce;
       next_ns = 0;
     }
-    if (!nonce && what == OperatorRequest::arm) return false;
     if (const std::int64_t now_ns = monotonic_now_ns(); now_ns >= next_ns) {
-      tried = true;
       sent |= try_to_send(what, number, nonce.value_or(0));
       next_ns = now_ns + kAskAgain_ns;
     }
     return false;
   };
   if (wait_for(understood, patience_s)) return RequestOutcome::done;
-  if (tried && !sent) throw_unsent();
+  if (!sent) throw_unsent();
   return heard() ? RequestOutcome::refused : RequestOutcome::unheard;
 }
 

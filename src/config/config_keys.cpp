@@ -78,7 +78,10 @@ struct NumberReader {
       return;
     }
     const std::size_t size = node.items.size();
-    if (node.kind != YamlNode::Kind::list || innermost || size == 0) fail(node, path, expected);
+    if (node.kind != YamlNode::Kind::list || innermost || size == 0)
+      fail(node, path, expected,
+           node.kind == YamlNode::Kind::scalar ? likely_fix(node.text, node.quoted, form, unit)
+                                               : "");
     const int wanted = form.sizes[depth];
     const bool counted = wanted != Form::kAny && !(any_size && depth == 0);
     if (counted ? size != static_cast<std::size_t>(wanted) : size > kLongestList)
@@ -151,10 +154,12 @@ void ConfigKeys::report_unknown() {
     const Location& at = it.section->items[it.index].key_location;
     std::set<std::string> taken;
     const std::string section = without_indices(it.path);
-    for (const std::string& other : it.section->keys)
-      taken.insert(section.empty() ? other : fmt::format("{}.{}", section, other));
+    for (std::size_t i = 0; i < it.section->keys.size(); ++i)  // what is included may be meant
+      if (*it.section->items[i].key_location.file == *at.file)
+        taken.insert(section.empty() ? it.section->keys[i]
+                                     : fmt::format("{}.{}", section, it.section->keys[i]));
     // "{a: 0,5}" is read as a: 0 and 5: nothing.
-    if (it.index > 0 && plain_number(key) &&
+    if (it.index > 0 && key.find_first_not_of("0123456789") == std::string::npos &&
         it.section->items[it.index].kind == YamlNode::Kind::nothing &&
         it.section->items[it.index - 1].kind == YamlNode::Kind::scalar) {
       const std::string& before = it.section->items[it.index - 1].text;
@@ -226,7 +231,7 @@ const YamlNode* ConfigKeys::take(const Key& key, const std::string& expected) {
   const YamlNode* node = frame.node->find(key.name);
   if (node != nullptr) {
     locations_.insert_or_assign(path, node->key_location);
-  } else if (key.presence == Presence::required && !frame.quiet) {
+  } else if (key.presence == Presence::required && !frame.quiet && frame.kind_known) {
     const Location& at = frame.node->key_location;
     missing_.emplace_back(*at.file, at.line, path, expected, "nothing: the key is missing");
     frame.failed = true;
@@ -314,6 +319,7 @@ void ConfigKeys::either(const char* exact, const Body& exact_body, const char* f
     if (as_exact && frame.node->find(friendly) != nullptr) {
       report({*node->key_location.file, node->key_location.line, frame.path_of(exact),
               fmt::format("either {} or {}", exact, friendly), "both"});
+      frames_.back().kind_known = false;
     }
   }
   when(as_exact, exact_body);

@@ -41,6 +41,26 @@ std::string_view stem(std::string_view name) {
   return cut == std::string_view::npos ? name : name.substr(0, cut);
 }
 
+/// Whether all words of the shorter name are in the longer one, in their order.
+bool words_of(std::string_view shorter, std::string_view longer) {
+  const auto next = [](std::string_view& rest) {
+    const std::size_t end = std::min(rest.find('_'), rest.size());
+    const std::string_view word = rest.substr(0, end);
+    rest.remove_prefix(std::min(rest.size(), end + 1));
+    return word;
+  };
+  int words = 0;
+  while (!shorter.empty()) {
+    const std::string_view word = next(shorter);
+    ++words;
+    while (true) {
+      if (longer.empty()) return false;
+      if (next(longer) == word) break;
+    }
+  }
+  return words > 1;
+}
+
 /// How far apart two names are; infinite where nobody would mistake one for the other.
 double name_cost(std::string_view written, std::string_view known) {
   constexpr double kFar = std::numeric_limits<double>::infinity();
@@ -57,6 +77,7 @@ double name_cost(std::string_view written, std::string_view known) {
   const auto distance = static_cast<double>(edit_distance(a, b));
   const auto most = static_cast<double>(std::max<std::size_t>(1, longer.size() / 4));
   if (distance <= most) return distance;
+  if (words_of(shorter, longer)) return 1.5;
   if (edit_distance(stem(a), stem(b)) <= 1 && stem(b).size() >= 5) return 2.0;
   return kFar;
 }
@@ -83,6 +104,15 @@ bool zeros_in_front(std::string_view text) {
   if (text.starts_with('-') || text.starts_with('+')) text.remove_prefix(1);
   return text.size() > 1 && text[0] == '0' &&
          std::isdigit(static_cast<unsigned char>(text[1])) != 0;
+}
+
+/// "0.15" of "-00.15".
+std::string_view without_zeros(std::string_view text) {
+  while (!text.empty() && (text[0] == '-' || text[0] == '+')) text.remove_prefix(1);
+  while (text.size() > 1 && text[0] == '0' &&
+         std::isdigit(static_cast<unsigned char>(text[1])) != 0)
+    text.remove_prefix(1);
+  return text;
 }
 
 std::string replaced(std::string text, std::string_view any_of, std::string_view by) {
@@ -133,7 +163,7 @@ std::string range_fix(double value, const Form& form, std::string_view unit) {
   for (const OtherUnit& other : kOtherUnits) {
     const double converted = value * other.factor;
     if (other.unit != unit || std::abs(other.factor) >= 1.0 || !form.contains(converted)) continue;
-    if (std::abs(value) < 2.0 * std::abs(form.high)) continue;
+    if (std::abs(value) <= std::abs(form.high)) continue;
     if (unit == "rad") return fmt::format("degrees? write {}*pi/180", value);
     return fmt::format("in {}? then it is {:.6g} {}", other.name, converted, unit);
   }
@@ -157,8 +187,8 @@ std::string number_fix(const std::string& text, bool quoted, const Form& form,
   const auto number = [](const std::string& t) { return plain_number(t).has_value(); };
   if (quoted && number(text)) return "write it without quotes";
   if (zeros_in_front(text))
-    return "zeros in front make it octal to some programs: write " +
-           text.substr(std::min(text.find_first_not_of("+-0"), text.size() - 1));
+    return fmt::format("zeros in front make it octal to some programs: write {}{}",
+                       text.starts_with('-') ? "-" : "", without_zeros(text));
   if (const auto value = plain_number(text)) {
     if (form.whole && *value != std::round(*value)) return {};
     if (form.whole && form.contains(*value)) return fmt::format("write {}", *value);

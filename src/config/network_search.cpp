@@ -7,6 +7,8 @@
 #include <system_error>
 #include <utility>
 
+#include "config/yaml_tree.hpp"
+
 namespace softarm {
 namespace {
 
@@ -40,8 +42,9 @@ void read(const std::filesystem::path& file, Budget& left, LcmSettings& lcm) {
   std::istringstream text(all);
   for (std::string line; std::getline(text, line);) {
     line = line.substr(0, line.find('#'));
+    std::string looked_for;
     if (const std::string other = value_of("include", line); !other.empty())
-      read(file.parent_path() / other, left, lcm);
+      read(included_file(file, other, looked_for), left, lcm);
     for (const auto& [key, setting] : keys)
       if (const std::string value = value_of(key, line); !value.empty()) *setting = value;
   }

@@ -37,7 +37,7 @@ std::string quoted_excerpt(const std::string& text) {
 /// Builds the tree from the parser's events, so that errors which yaml-cpp tolerates are found.
 class TreeBuilder : public YAML::EventHandler {
  public:
-  explicit TreeBuilder(FileName file) : file_(std::move(file)) {}
+  TreeBuilder(FileName file, const std::string& text) : file_(std::move(file)), text_(text) {}
 
   YamlNode take_root() { return std::move(root_); }
 
@@ -66,6 +66,7 @@ class TreeBuilder : public YAML::EventHandler {
     YamlNode scalar = node(mark, YamlNode::Kind::scalar);
     scalar.text = value;
     scalar.quoted = tag == "!";
+    if (scalar.quoted) check_quote(mark);
     add(mark, anchored(std::move(scalar), anchor));
   }
   void OnSequenceStart(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t anchor,
@@ -112,6 +113,14 @@ class TreeBuilder : public YAML::EventHandler {
   [[noreturn]] void fail(const YAML::Mark& mark, const std::string& expected,
                          const std::string& got) const {
     throw ConfigError(*file_, mark.line + 1, path(), expected, got);
+  }
+
+  /// The parser takes what follows an opening quote to the next one, however far.
+  void check_quote(const YAML::Mark& mark) const {
+    const auto at = static_cast<std::size_t>(mark.pos);
+    if (at >= text_.size() || (text_[at] != '"' && text_[at] != '\'')) return;
+    if (text_.find(text_[at], at + 1) > text_.find('\n', at))
+      fail(mark, "a closing quote in the same line", "an opening one alone");
   }
 
   static std::size_t size_of(const YamlNode& node) {
@@ -183,6 +192,7 @@ class TreeBuilder : public YAML::EventHandler {
   }
 
   FileName file_;
+  const std::string& text_;
   std::vector<Level> levels_;
   YamlNode root_;
   std::map<YAML::anchor_t, YamlNode> anchors_;
@@ -222,11 +232,11 @@ YamlNode parse(const std::filesystem::path& file) {
     throw ConfigError(*name, line, "", expected, got);
   };
   std::istringstream stream(text);
-  TreeBuilder builder(name);
+  TreeBuilder builder(name, text);
   try {
     YAML::Parser parser(stream);
     parser.HandleNextDocument(builder);
-    TreeBuilder rest(name);
+    TreeBuilder rest(name, text);
     if (parser.HandleNextDocument(rest)) {
       throw ConfigError(*name, 0, "", "one YAML document", "several (a line \"---\")");
     }
@@ -258,19 +268,6 @@ void merge(YamlNode& base, YamlNode&& over) {
   }
 }
 
-/// A file that `from` includes: relative to its name or, where that is a link, to the file itself.
-std::filesystem::path included_by(const std::filesystem::path& from, const std::string& name,
-                                  std::string& looked_for) {
-  std::error_code code;
-  std::filesystem::path first = from.parent_path() / name;
-  const std::filesystem::path real = std::filesystem::canonical(from, code).parent_path() / name;
-  looked_for = "no file " + first.string();
-  if (std::filesystem::is_regular_file(first, code)) return first;
-  if (code || !std::filesystem::equivalent(real.parent_path(), first.parent_path(), code) || code)
-    looked_for += " and none " + real.string();
-  return std::filesystem::is_regular_file(real, code) ? real : std::filesystem::path();
-}
-
 /// `chain`: the files that include one another, this one last; `files`: all read.
 YamlNode read_with_includes(const std::filesystem::path& file, Files& chain, Files& files) {
   files.push_back(file);
@@ -287,7 +284,7 @@ YamlNode read_with_includes(const std::filesystem::path& file, Files& chain, Fil
   };
   if (include.kind != YamlNode::Kind::scalar) fail("the name of a file", include.describe());
   std::string looked_for;
-  const auto included = included_by(file, include.text, looked_for);
+  const auto included = included_file(file, include.text, looked_for);
   if (included.empty())
     fail("an existing file, relative to this one",
          fmt::format("{} ({})", quoted_excerpt(include.text), looked_for));
@@ -322,6 +319,18 @@ std::string YamlNode::describe() const {
       break;
   }
   return "nothing";
+}
+
+std::filesystem::path included_file(const std::filesystem::path& from, const std::string& name,
+                                    std::string& looked_for) {
+  std::error_code code;
+  std::filesystem::path first = from.parent_path() / name;
+  const std::filesystem::path real = std::filesystem::canonical(from, code).parent_path() / name;
+  looked_for = "no file " + first.string();
+  if (std::filesystem::is_regular_file(first, code)) return first;
+  if (code || !std::filesystem::equivalent(real.parent_path(), first.parent_path(), code) || code)
+    looked_for += " and none " + real.string();
+  return std::filesystem::is_regular_file(real, code) ? real : std::filesystem::path();
 }
 
 YamlNode read_yaml_file(const std::filesystem::path& file, Files& files) {

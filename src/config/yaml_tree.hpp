@@ -29,6 +29,11 @@ struct YamlNode {
   std::string describe() const;
 };
 
+/// The file that `from` includes by this name: relative to the name of `from` or, where that is a
+/// link, to the file itself; empty where there is none. @param looked_for  gets where it was sought
+std::filesystem::path included_file(const std::filesystem::path& from, const std::string& name,
+                                    std::string& looked_for);
+
 /// Reads a file with everything it includes; values of the including file win, maps are merged key
 /// by key. The root is a map. @param files  gets the name of every file read
 /// @throws ConfigError, no other exception

@@ -14,7 +14,7 @@ namespace softarm {
 namespace {
 
 constexpr double kStill_m = 1e-3;
-constexpr double kRest_s = 1.0;
+constexpr double kRest_s = 1.0, kLeastRest_s = 0.3;
 constexpr std::size_t kLooked = 5000;  ///< rows that are looked at, spread over the table
 
 std::string lower(std::string text) {
@@ -83,6 +83,8 @@ class Proposal {
     Eigen::Vector3d p;
     for (std::size_t i = 0; i < 3; ++i)
       p[static_cast<Eigen::Index>(i)] = table_.at(row, bodies_[body].position[i]);
+    // Zeros are written where a body was not seen.
+    if (rotation(row, body, false).coeffs().isZero(0.0)) p.setConstant(std::nan(""));
     return p;
   }
   Eigen::Quaterniond rotation(std::size_t row, std::size_t body, bool w_first) const {
@@ -209,11 +211,12 @@ class Proposal {
                                                        unit_m_ < 1.0 ? "millimetres" : "metres")};
   }
 
-  /// The first second in which no body moves; else the first row with all.
+  /// The first second in which no body moves, or the longest part of one; else the first row with
+  /// all bodies.
   void find_rest() {
     std::vector<std::size_t> window;
     for (std::size_t row = 0; row < table_.rows(); ++row) {
-      bool seen = true;
+      bool seen = std::isfinite(time_s(row));
       for (std::size_t i = 0; i < bodies_.size(); ++i)
         seen = seen && position(row, i).allFinite() && rotation(row, i, false).coeffs().allFinite();
       if (!seen) continue;
@@ -222,12 +225,13 @@ class Proposal {
         if (unit_m_ * (position(row, i) - position(window.front(), i)).norm() > kStill_m)
           window.clear();
       window.push_back(row);
-      if (time_s(row) - time_s(window.front()) < kRest_s) continue;
+      const double still_s = time_s(row) - time_s(window.front());
+      if (still_s < kLeastRest_s || still_s <= rest_to_s_ - rest_from_s_) continue;
       take_rest(window.front());
       rest_from_s_ = time_s(window.front());
       rest_to_s_ = time_s(row);
       still_ = true;
-      return;
+      if (still_s >= kRest_s) return;
     }
     if (rest_.empty())
       throw std::runtime_error(
@@ -264,21 +268,19 @@ class Proposal {
     }
   }
 
-  /// How far the turn of the ends is off twice that of the chords, which is what a bend does.
+  /// How far chords turn otherwise than halfway between their two ends, as a bend makes them.
   double bend_error(bool w_first) const {
     double sum = 0.0;
-    const Eigen::Quaterniond base = rotation(rest_row_, 0, w_first).normalized();
     for (const std::size_t row : rows_)
       for (std::size_t i = 1; i < bodies_.size(); ++i) {
-        const Eigen::Vector3d now = position(row, i) - position(row, i - 1),
-                              then = rest_[i] - rest_[i - 1];
-        const double chord = std::atan2(now.cross(then).norm(), now.dot(then));
-        const Eigen::Quaterniond turn =
-            rotation(row, i, w_first) * rotation(rest_row_, i, w_first).conjugate();
-        const Eigen::Quaterniond before =
-            rotation(row, i - 1, w_first) * rotation(rest_row_, i - 1, w_first).conjugate();
-        const double error = turn.normalized().angularDistance(before.normalized()) - 2.0 * chord;
-        if (std::isfinite(error) && base.coeffs().allFinite()) sum += error * error;
+        const auto turn = [&](std::size_t body) {
+          return (rotation(row, body, w_first) * rotation(rest_row_, body, w_first).conjugate())
+              .normalized();
+        };
+        const Eigen::Vector3d then = (rest_[i] - rest_[i - 1]).normalized();
+        const Eigen::Vector3d now = (position(row, i) - position(row, i - 1)).normalized();
+        const double error = (turn(i - 1).slerp(0.5, turn(i)) * then - now).squaredNorm();
+        if (std::isfinite(error)) sum += error;
       }
     return sum;
   }
@@ -296,9 +298,10 @@ class Proposal {
       return;
     }
     const double as_xyzw = bend_error(false), as_wxyz = bend_error(true);
-    order_ = {as_wxyz < as_xyzw ? "wxyz" : "xyzw",
-              fmt::format("orientations then follow positions better ({:.2g} against {:.2g} rad^2)",
-                          std::min(as_xyzw, as_wxyz), std::max(as_xyzw, as_wxyz))};
+    order_ = {
+        as_wxyz < as_xyzw ? "wxyz" : "xyzw",
+        fmt::format("orientations then follow positions better (errors {:.2g} against {:.2g})",
+                    std::min(as_xyzw, as_wxyz), std::max(as_xyzw, as_wxyz))};
   }
 
   Eigen::Vector3d to_tip() const { return (rest_.back() - rest_.front()).normalized(); }
@@ -361,12 +364,12 @@ class Proposal {
 
   std::string rest_text() const {
     if (!still_)
-      return "# rest: {from_s: 0, to_s: 1}  # NOT FOUND: no second in which the arm is still "
+      return "# rest: {from_s: 0, to_s: 1}  # NOT FOUND: no 0.3 s in which the arm is still "
              "within 1 mm\n";
     const bool standing = to_tip().maxCoeff() > 0.9;
     return fmt::format(
-        "rest: {{from_s: {:.12g}, to_s: {:.12g}{}}}  # the first second without motion\n",
-        rest_from_s_, rest_to_s_, standing ? ", base_rotation: standing" : "");
+        "rest: {{from_s: {:.12g}, to_s: {:.12g}{}}}  # without motion, within 1 mm\n", rest_from_s_,
+        rest_to_s_, standing ? ", base_rotation: standing" : "");
   }
 
   std::string pressures() const {
@@ -374,11 +377,13 @@ class Proposal {
     double most = 0.0;
     for (std::size_t k = 0; k < table_.columns.size(); ++k) {
       const std::string name = lower(table_.columns[k]);
-      const bool numbered = name.size() >= 2 && name[0] == 'p' &&
-                            std::isdigit(static_cast<unsigned char>(name[1])) != 0;
+      // p1, p_1, pd_1, pm_1
+      const std::size_t digit = name.find_first_of("0123456789");
+      const bool numbered =
+          name[0] == 'p' && (digit == 1 || (digit <= 3 && has("_dm", {name.substr(1, 1).c_str()})));
       if (!numbered && !has(name, {"press", "bar", "kpa", "psi", "valve"})) continue;
       std::string& list =
-          has(name, {"set", "cmd", "command", "ref", "des", "goal"}) ? commanded : measured;
+          has(name, {"set", "cmd", "command", "ref", "des", "goal", "pd_"}) ? commanded : measured;
       list += fmt::format("{}{}", list.empty() ? "" : " ", column(k));
       for (const char* unit : {"mbar", "kpa", "psi", "bar"})
         if (unit_name.empty() && has(name, {unit})) unit_name = unit;
@@ -388,7 +393,8 @@ class Proposal {
     if (commanded.empty() && measured.empty())
       return "# pressures: {commanded: ..., measured: ...}  # no column is named so\n";
     double unit = most > 2e4 ? 1e-5 : most > 2e3 ? 1e-3 : most > 20.0 ? 1e-2 : 1.0;
-    std::string why = fmt::format("the largest is {:.4g}", most);
+    std::string why = fmt::format("the largest is {:.4g}{}", most,
+                                  most > 5.0 && most <= 20.0 ? ": bar, or psi (0.0689476)?" : "");
     if (!unit_name.empty()) {
       unit = unit_name == "kpa"    ? 1e-2
              : unit_name == "mbar" ? 1e-3

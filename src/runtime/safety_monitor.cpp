@@ -317,7 +317,7 @@ Mode SafetyMonitor::step(const SafetyInput& input) noexcept {
       break;
     case Mode::active:
     case Mode::hold:
-      if (worst.demands > Mode::active && worst.demands >= mode_) {
+      if (worst.demands > Mode::active) {
         enter(worst);
       } else if (mode_ == Mode::hold) {
         try_to_activate(input, reason_);

@@ -22,6 +22,8 @@ ValveSide::ValveSide(const ActuationSettings& actuation, std::int64_t longest_va
 CommandVerdict ValveSide::receive(const PressureCommand& command, std::int64_t now_ns) noexcept {
   update(now_ns);
   const CommandVerdict verdict = expiry_.receive(command, now_ns);
+  if (verdict == CommandVerdict::in_force || verdict == CommandVerdict::other_sender)
+    heard_ns_ = now_ns;
   if (verdict == CommandVerdict::other_sender) {
     if (in_force_) vent();
     degraded_until_ns_ = now_ns + kDegradedFor_ns;
@@ -44,7 +46,9 @@ void ValveSide::vent() noexcept {
 
 void ValveSide::update(std::int64_t now_ns) noexcept {
   expiry_.update(now_ns);
-  if (expiry_.vented() || expiry_.set_points_bar().isZero(0.0)) must_see_zero_ = false;
+  const bool silent = expiry_.vented() && age_ns(now_ns, heard_ns_) >= expiry_.longest_ns();
+  const bool zero = !expiry_.vented() && expiry_.set_points_bar().isZero(0.0);
+  if (silent || zero) must_see_zero_ = false;
   const bool in_force = !expiry_.vented() && !degraded(now_ns);
   if (in_force_ && !in_force) vent();
   const std::int64_t passed_ns = in_force_ ? std::min(now_ns - updated_ns_, kLongestStep_ns) : 0;

@@ -134,6 +134,11 @@ void DaemonLink::take_reference(const ReceivedMessage& packet) noexcept {
   input_.reference = &reference_;
 }
 
+/// Those who see the daemon that commands the arm may ask its shadow for the same: it moves nothing.
+bool DaemonLink::is_recent(std::int64_t nonce, std::int64_t since_us) const noexcept {
+  return messages_.pressure_command.shadow != 0 || nonces_.accepts(nonce, now_ns_ / 1000, since_us);
+}
+
 void DaemonLink::take_operator(const ReceivedMessage& packet) noexcept {
   ++requests_;
   if (!decode(packet.bytes, operator_message_)) {
@@ -148,13 +153,13 @@ void DaemonLink::take_operator(const ReceivedMessage& packet) noexcept {
   newest_sequence_ = std::max(newest_sequence_, sequence);
   if (request == Request::ARM) {
     const bool younger = sequence > refused_sequence_ || age_ns(now_ns_, refused_ns_) > kPress_ns;
-    input_.requests.arm |= younger && nonces_.accepts(nonce, now_us, vented_us_);
+    input_.requests.arm |= younger && is_recent(nonce, vented_us_);
     return;
   }
   // A request to vent is obeyed whatever its number and nonce; so is a request of an unknown kind.
   // But only somebody who has seen the FAULT acknowledges it, not one of a flood, nor a record.
   const bool emergency = request == Request::EMERGENCY_STOP;
-  const bool acknowledges = request == Request::DISARM && nonces_.accepts(nonce, now_us, fault_us_);
+  const bool acknowledges = request == Request::DISARM && is_recent(nonce, fault_us_);
   input_.requests.emergency_stop |= emergency;
   input_.requests.disarm |= !emergency && (mode_ != Mode::fault || acknowledges);
   if (emergency) fault_us_ = now_us;
@@ -191,8 +196,8 @@ void DaemonLink::take_measurement(const ReceivedMessage& packet) noexcept {
   if (messages_.pressure_command.shadow == 0) input_.measured_bar = &measured_bar_;
 }
 
-/// Valves that hold no command of ours, or have held none for a while since their last report, have
-/// vented: our command was lost, late, or refused, whatever else is known.
+/// Valves that hold no command, or held none for a while since their last report, have vented: our
+/// command was lost, late, or refused, although it was sent in time.
 void DaemonLink::take_valves_report() noexcept {
   const bool fell = valves_heard_ns_ != kNever && measurement_message_.expired != valves_expired_;
   valves_expired_ = measurement_message_.expired;
@@ -210,7 +215,7 @@ void DaemonLink::take_go(const ReceivedMessage& packet) noexcept {
   }
   if (deadman_message_.go == 0) released_ = true;
   if (deadman_message_.go == 0 || deadman_message_.sequence == go_sequence_ ||
-      !nonces_.accepts(deadman_message_.nonce, now_ns_ / 1000, kNever))
+      !is_recent(deadman_message_.nonce, kNever))
     return;
   go_sequence_ = deadman_message_.sequence;
   newest_go_ns_ = arrival_ns(packet);

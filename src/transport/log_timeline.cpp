@@ -17,6 +17,7 @@ constexpr std::int64_t kAgree_ns = 20 * kMs;     ///< a sender's clock and the s
 constexpr std::int64_t kMocapAgree_ns = 100 * kMs;
 constexpr std::int64_t kLongest_ns = 30LL * 86'400 * 1000 * kMs;  ///< of a clock that ran on
 constexpr std::int64_t kAlive_ns = 1000 * kMs;                    ///< since its newest message
+constexpr std::int64_t kLongestStop_ns = 300 * kMs;
 constexpr int kConfirmations = 3;
 constexpr int kLongestHold = 64;
 
@@ -72,12 +73,13 @@ std::optional<std::int64_t> LogTimeline::arrival_ns(const LogEvent& event) {
     started_ = true;
     newest_ns_ = *stamp_ns;
   }
-  const std::int64_t line_ns = std::max(newest_ns_, place(*source, own, *stamp_ns, event.position));
+  const std::int64_t placed_ns = place(*source, own, *stamp_ns, event.position);
+  const std::int64_t line_ns = std::max(newest_ns_, placed_ns);
   newest_ns_ = line_ns;
-  if (own && own != source->own_ns) {
+  if (own && own != source->own_ns && !undecided_) {
     source->runs = source->own_ns && *own > *source->own_ns;
     source->own_ns = own;
-    source->line_ns = line_ns;
+    source->line_ns = placed_ns;
   }
   return line_ns;
 }
@@ -92,12 +94,18 @@ std::int64_t LogTimeline::place(Source& source, std::optional<std::int64_t> own_
   const std::int64_t own_line_ns = source.line_ns + advance_ns;
   const bool agree = clocked && magnitude(guess_ns - own_line_ns) <=
                                     (source.monotonic ? kAgree_ns : kMocapAgree_ns);
+  undecided_ = false;
   if (!jumps) {
     held_ = 0;
     if (!source.monotonic || !clocked) return guess_ns;
-    if (!agree && confirmed(guess_ns - own_line_ns))
+    if (agree) {
+      suspicions_ = disagreements_ = 0;
+    } else if (confirmed(guess_ns - own_line_ns)) {
       return bridged(own_line_ns, stamp_ns, position);
-    if (agree) suspicions_ = 0;
+    } else {
+      undecided_ =
+          ++disagreements_ < kLongestHold;  // the last message that agreed is compared with
+    }
     return guess_ns;
   }
   // Motion capture may be stamped by the clock that was set: a message of ours decides.
@@ -133,9 +141,11 @@ std::int64_t LogTimeline::after_gap(std::int64_t passed_ns, std::int64_t stamp_n
 std::int64_t LogTimeline::bridged(std::int64_t line_ns, std::int64_t stamp_ns,
                                   std::int64_t position) {
   const std::int64_t step_ns = stamp_ns - shift_ns_ - line_ns;
-  const std::int64_t placed_ns = std::clamp(line_ns, newest_ns_, newest_ns_ + kLongestGap_ns);
+  // Not long before what has come: the line would stand still until then.
+  const std::int64_t placed_ns =
+      std::clamp(line_ns, newest_ns_ - kLongestStop_ns, newest_ns_ + kLongestGap_ns);
   shift_ns_ = stamp_ns - placed_ns;
-  held_ = suspicions_ = 0;
+  held_ = suspicions_ = disagreements_ = 0;
   add(LogBreak::Kind::clock_set, position, step_ns);
   if (line_ns > placed_ns) add(LogBreak::Kind::gap, position, line_ns - newest_ns_);
   return placed_ns;

@@ -9,6 +9,9 @@
 namespace softarm {
 namespace {
 
+/// A clock that repeats itself from frame to frame is coarse: so many of a weight of four a
+/// repetition, which every frame with a new stamp lowers by one.
+constexpr int kCoarse = 16, kCoarsest = 64, kRepetition = 4;
 constexpr std::int64_t kNonsense_us = kLatest_us + 1;  // no clock relation takes it
 
 }  // namespace
@@ -45,8 +48,16 @@ MocapReceipt MocapSource::take(std::size_t channel, std::span<const std::byte> b
   if (!format_->decode(bytes, *sent_)) return MocapReceipt::malformed;
   if (kind_.channel_per_body) return take_body(channel, arrival_ns, frame);
   adapter_.to_frame(*sent_, frame);
-  sender_time_us_ = is_time_us(sent_->sender_time_us) ? sent_->sender_time_us : kNonsense_us;
-  frame.capture_ns = clock_.capture_ns(arrival_ns, sender_time_us_);
+  const std::int64_t stamp_us =
+      is_time_us(sent_->sender_time_us) ? sent_->sender_time_us : kNonsense_us;
+  if (sent_->frame_number != frame_number_) {
+    const bool repeats = stamp_us == sender_time_us_;
+    coarse_ = std::clamp(coarse_ + (repeats ? kRepetition : -1), 0, kCoarsest);
+    frame_number_ = sent_->frame_number;
+  }
+  sender_time_us_ = stamp_us;
+  // Several frames with one stamp would be captured at once: the arrival is the better time.
+  frame.capture_ns = clock_.capture_ns(arrival_ns, coarse_ < kCoarse ? stamp_us : kNonsense_us);
   return MocapReceipt::frame;
 }
 

@@ -26,6 +26,7 @@ ValveDriver::ValveDriver(const ValveGuardSettings& settings, std::unique_ptr<Val
       clock_(std::move(clock)),
       order_(settings.driver.order),
       address_(backend_->address()),
+      vented_bar_(settings.driver.vented_bar),
       guard_(settings),
       read_back_(settings.chambers),
       newest_(settings.chambers),
@@ -98,10 +99,15 @@ void ValveDriver::give_up() noexcept {
   if (guard_.reason() == ValveReason::zero_unconfirmed) {
     Eigen::Index chamber = 0;
     const double bar = read_back_.actual_bar.maxCoeff(&chamber);
-    const auto end = fmt::format_to_n(
-        error_.data(), error_.size() - 1,
-        FMT_STRING("chamber {} reads {:.3f} bar; no request is sent, so that it vents by itself"),
-        chamber, bar);
+    const auto end =
+        bar > vented_bar_
+            ? fmt::format_to_n(error_.data(), error_.size() - 1,
+                               FMT_STRING("chamber {} reads {:.3f} bar; nothing is sent, so that "
+                                          "it vents by itself"),
+                               chamber, bar)
+            : fmt::format_to_n(error_.data(), error_.size() - 1,
+                               FMT_STRING("not measured; nothing is sent, so that it vents by "
+                                          "itself"));
     *end.out = '\0';
   } else if (guard_.reason() != ValveReason::no_connection) {
     backend_->write(zero_);

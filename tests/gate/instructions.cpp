@@ -1,11 +1,14 @@
 // Runs the key functions under callgrind: each over its random states once, between a reset of the
-// counters and a dump that carries its name and the number of calls.
+// counters and a dump that carries its name and the number of calls; then the worst ticks, one a
+// dump. `--time` measures those ticks by the clock instead.
 #include <fmt/format.h>
 #include <valgrind/callgrind.h>
 
 #include <cstdio>
+#include <string_view>
 
 #include "dev/bench/methods.hpp"
+#include "gate/ticks.hpp"
 
 namespace softarm {
 namespace {
@@ -31,7 +34,11 @@ void count(const Method& method, int segments) {
 }  // namespace
 }  // namespace softarm
 
-int main() {
+int main(int argc, char** argv) {
+  if (argc == 2 && std::string_view(argv[1]) == "--time") {
+    softarm::time_ticks();
+    return 0;
+  }
   using softarm::Method, softarm::Route, softarm::MassModel;
   for (const MassModel mass : {MassModel::point, MassModel::distributed}) {
     for (const int segments : {3, 10}) {
@@ -47,5 +54,6 @@ int main() {
     softarm::count(Method{Route::recursion, false, mass}, 100);
     softarm::count(Method{Route::controller, false, mass}, 100);
   }
+  softarm::count_ticks();
   if (RUNNING_ON_VALGRIND == 0) std::puts("nothing is counted without valgrind --tool=callgrind");
 }

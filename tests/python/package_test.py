@@ -83,7 +83,7 @@ class Configuration(unittest.TestCase):
     def test_an_error_has_its_parts(self):
         with tempfile.TemporaryDirectory() as folder:
             file = pathlib.Path(folder) / "wrong.yaml"
-            file.write_text("name: wrong\narm:\n  segments: 0\n")
+            file.write_text(f"include: {PAPER_ARM}\narm:\n  segments: 0\n")
             with self.assertRaises(softarm.ConfigError) as caught:
                 softarm.load_experiment(file)
         error = caught.exception

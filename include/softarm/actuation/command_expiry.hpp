@@ -38,10 +38,11 @@ constexpr bool has_expired(std::int64_t sent_us, std::int64_t validity_us,
 
 /// Whether a command with this time stamp of its sender is not of this moment, where the sender
 /// reads the receiver's clock: it has expired on the way, was played from a log, or is of an
-/// earlier boot. 0: the sender gave no time.
-constexpr bool is_untimely(std::int64_t sent_us, std::int64_t validity_us,
-                           std::int64_t now_us) noexcept {
-  if (sent_us == 0) return false;
+/// earlier boot. Not judged: 0, where the sender gave no time, and times of the wall clock.
+inline bool is_untimely(std::int64_t sent_us, std::int64_t validity_us,
+                        std::int64_t now_us) noexcept {
+  constexpr std::int64_t kWallClock_us = 1'000'000'000'000'000;  // 2001; no machine runs so long
+  if (sent_us == 0 || (sent_us > kWallClock_us && is_time_us(sent_us))) return false;
   return !is_time_us(sent_us) || has_expired(sent_us, validity_us, now_us) ||
          sent_us - now_us > validity_us;
 }
@@ -86,6 +87,8 @@ class CommandExpiry {
   const Eigen::VectorXd& set_points_bar() const noexcept { return set_points_bar_; }
 
  private:
+  friend struct ProofOfGuard;  ///< tests/proof: all of its state
+
   CommandVerdict compare(const PressureCommand& command, std::int64_t arrival_ns) const noexcept;
 
   std::int64_t longest_ns_;

@@ -28,6 +28,7 @@ using Files = std::vector<std::filesystem::path>;
 /// that it names. What is not a regular file (/dev/stdout, a pipe) is written as it is.
 class OutputFile {
  public:
+  /// What becomes of it without commit().
   enum class Kind {
     document,  ///< whole or not at all: without commit() the file stays as it was, or is not there
     record     ///< grows while something runs: what was written by then is always kept

@@ -99,10 +99,9 @@ class OperatorClient {
   /// not be sent
   void send(OperatorRequest what);
   /// Sends one request 20 times a second until a status received after the first shows the result,
-  /// or until `patience_s` have passed. All carry the number and the nonce of this call: the daemon
-  /// refuses an `arm` a second after the call, and from a later disarm or emergency stop on. A
-  /// request that vents is sent at once, an `arm` once a status was received. Blocks. @throws
-  /// TransportError if none could be sent
+  /// or until `patience_s` have passed. All carry the number of this call and, from the first status
+  /// on, its nonce: the daemon refuses an `arm` a second later, and from a later disarm or emergency
+  /// stop on. Blocks. @throws TransportError if none could be sent
   RequestOutcome request(OperatorRequest what, double patience_s = 2.0);
   /// Sends the dead-man input: "go" (true) holds for safety.deadman_timeout_s from its arrival, or
   /// until it is withdrawn (false). It counts only if a status was handled within the last second.

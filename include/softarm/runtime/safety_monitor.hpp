@@ -154,6 +154,8 @@ class SafetyMonitor {
   const SafetyThresholds& thresholds() const noexcept { return thresholds_; }
 
  private:
+  friend struct ProofOfMonitor;  ///< tests/proof: ages beyond their thresholds
+
   void note_stop(const SafetyInput& input) noexcept;
   CauseRule worst_cause(const SafetyInput& input) const noexcept;
   bool under_control() const noexcept { return mode_ == Mode::active || mode_ == Mode::hold; }

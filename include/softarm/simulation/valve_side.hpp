@@ -54,6 +54,7 @@ class ValveSide {
   bool reached_ = true;  ///< set points are those commanded
   bool must_see_zero_ = false;
   std::int64_t degraded_until_ns_ = kNever;
+  std::int64_t heard_ns_ = kNever;
   std::int64_t updated_ns_ = kNever;
   std::int64_t times_vented_ = 0;
 };

@@ -94,6 +94,7 @@ class DaemonLink {
   void take_go(const ReceivedMessage& packet) noexcept;
   void take_command(const ReceivedMessage& packet) noexcept;
   bool requests_lost(std::int64_t previous_ns) noexcept;
+  bool is_recent(std::int64_t nonce, std::int64_t since_us) const noexcept;
   std::int64_t arrival_ns(const ReceivedMessage& packet) const noexcept;
   bool command_expired(std::int64_t now_us) const noexcept;
 

@@ -18,6 +18,7 @@ namespace softarm {
 
 /// Where the logger's clock did not simply run on.
 struct LogBreak {
+  /// What happened.
   enum class Kind {
     clock_set,  ///< the clock was set, or a stamp damaged: the messages' own times bridge it
     gap,        ///< nothing came for longer than LogTimeline::kLongestGap_ns
@@ -80,6 +81,8 @@ class LogTimeline {
   std::int64_t newest_ns_ = 0;  ///< on the line
   int held_ = 0;                ///< events in a row that waited for a message with a clock
   std::int64_t suspected_ns_ = 0;
+  bool undecided_ = false;  ///< the newest message may have shown that the clock was set
+  int disagreements_ = 0;
   int suspicions_ = 0;  ///< events in a row by whose clocks the line is suspected_ns_ ahead
   std::vector<LogBreak> breaks_;
   std::int64_t count_ = 0;

@@ -31,7 +31,8 @@ enum class MocapReceipt {
 std::vector<std::string> mocap_channels(const TransportSettings& transport);
 
 /// Turns what arrives on `channels()` into frames, capture times included. Belongs to one thread;
-/// after construction it neither allocates nor throws.
+/// after construction it neither allocates nor throws. Where several frames carry one stamp, a
+/// coarse clock or none, capture times follow from arrivals as with capture_time: latency.
 class MocapSource {
  public:
   MocapSource(const TransportSettings& transport, const SafetySettings& safety,
@@ -63,6 +64,8 @@ class MocapSource {
   std::vector<std::string> channels_;
   FrameAssembler assembler_;
   std::int64_t sender_time_us_ = 0;
+  std::int64_t frame_number_ = 0;
+  int coarse_ = 0;  ///< how often stamps repeat: a clock of 15.6 ms grain, or one that stands still
   std::unique_ptr<MocapFormat> format_;
   std::unique_ptr<SentFrame> sent_;
 };

@@ -68,6 +68,7 @@ class ValveDriver {
   std::function<std::int64_t()> clock_;
   std::vector<int> order_;
   std::string address_;
+  double vented_bar_;
   ValveGuard guard_;
   PauseWatch pause_;
   ReadBack read_back_, newest_;

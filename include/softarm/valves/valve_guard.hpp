@@ -147,6 +147,8 @@ class ValveGuard {
   const ValveCounters& counters() const noexcept { return counters_; }
 
  private:
+  friend struct ProofOfGuard;  ///< tests/proof: all of its state
+
   void enter(ValveState state, ValveReason reason) noexcept;
   void disconnect(ValveReason reason, std::int64_t now_ns) noexcept;
   void degrade(ValveReason reason, int chamber) noexcept;

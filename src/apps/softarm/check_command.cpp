@@ -8,6 +8,7 @@
 #include "apps/program.hpp"
 #include "apps/softarm/commands.hpp"
 #include "apps/softarm/live_check.hpp"
+#include "softarm/commissioning/loop_check.hpp"
 #include "softarm/config/load.hpp"
 
 namespace softarm {
@@ -21,6 +22,19 @@ struct CheckOptions {
   LiveCheckOptions live_check;
 };
 
+/// Margins of the loop, as a comment below the configuration.
+void print_margins(const LoopMargins& margins) {
+  fmt::print("# loop, on the arm {}, {}: ", margins.at.arm, margins.at.where);
+  if (!(margins.at.growth_1ps < 0.0)) {
+    fmt::print("unstable\n");
+    return;
+  }
+  fmt::print("a disturbance fades at {:.2g} 1/s; gain margin {}{:.2f}, delay margin {}{:.1f} ms\n",
+             -margins.at.growth_1ps, margins.gain >= kLargestGainMargin ? "above " : "",
+             margins.gain, margins.delay_s >= kLargestDelayMargin_s ? "above " : "",
+             1e3 * margins.delay_s);
+}
+
 int check(const CheckOptions& options) {
   if (options.print_template || options.print_schema) {
     fmt::print("{}", options.print_template ? template_text() : schema_text());
@@ -31,9 +45,14 @@ int check(const CheckOptions& options) {
     say(fmt::format("{}: warning: {}\n", options.file, warning));
   }
   if (options.live) return check_live(experiment, options.live_check);
+  const LoopCheck loop = check_loop(experiment);
+  for (const std::string& warning : loop_warnings(loop))
+    fmt::print(stderr, "{}: warning: {}\n", options.file, warning);
   fmt::print("# {}, configuration {}\n{}", options.file, hash_text(experiment.hash),
              resolved_text(experiment));
   for (const std::string& line : reaction_times(experiment)) fmt::print("# {}\n", line);
+  print_margins(loop.configured);
+  print_margins(loop.worst);
   return kExitOk;
 }
 

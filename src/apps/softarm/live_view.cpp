@@ -58,8 +58,7 @@ void LiveView::draw(const StatusRecord& record) {
     text += segment_text(status, i);
   if (status.segments() > kShownSegments)
     text += fmt::format("... {} segments more\n", status.segments() - kShownSegments);
-  if (lines_ > 0) say(fmt::format("\033[{}A\033[J", lines_));
-  say(text);
+  softarm::draw(lines_ > 0 ? fmt::format("\033[{}A\033[J", lines_) : "", text);
   lines_ = std::count(text.begin(), text.end(), '\n');
   drawn_ns_ = monotonic_now_ns();
 }

@@ -84,6 +84,13 @@ class FaultTest : public ::testing::TestWithParam<Machine>, protected Station {
     station.active_in_row_ = 0;
     return station.wait_for([&] { return station.active_in_row_ >= statuses; });
   }
+  /// What a person does: presses the key again until it works.
+  static void ask_until_done(Station& station, OperatorRequest what) {
+    RequestOutcome outcome = RequestOutcome::unheard;
+    for (int k = 0; k < 10 && outcome != RequestOutcome::done; ++k)
+      outcome = station.client_->request(what);
+    EXPECT_EQ(outcome, RequestOutcome::done) << station.seen_text();
+  }
   bool becomes(Station& station, Mode mode, Reason reason) const {
     return station.wait_for([&] { return station.mode() == mode && station.reason() == reason; });
   }

@@ -184,13 +184,13 @@ TEST_P(FrameFaults, WithExplicitArmingARestartedSenderMustBeArmedAgain) {
   statuses_ = 0;
   daemon_ = start("softarmd");
   ASSERT_TRUE(becomes(*this, Mode::wait_frames, Reason::waiting_for_arm)) << daemon_->printed();
-  client_->send(OperatorRequest::arm);
+  ask_until_done(*this, OperatorRequest::arm);
   ASSERT_TRUE(wait_for([&] { return under_pressure(); })) << seen_text();
   inject("restart");
   EXPECT_TRUE(becomes(*this, Mode::vent, Reason::waiting_for_arm)) << seen_text();
   EXPECT_TRUE(saw(Mode::vent, Reason::sender_restarted)) << seen_text();
   EXPECT_EQ(largest(command_.pressure_bar), 0.0F);
-  client_->send(OperatorRequest::arm);
+  ask_until_done(*this, OperatorRequest::arm);
   EXPECT_TRUE(wait_for([&] { return mode() == Mode::active; })) << seen_text();
 }
 

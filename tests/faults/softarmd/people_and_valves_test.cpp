@@ -115,9 +115,9 @@ TEST_P(PeopleAndValves, SilentOrLeakingValvesAreALatchedFault) {
     const std::int64_t accepted = status_.frames_accepted;
     ASSERT_TRUE(wait_for([&] { return status_.frames_accepted > accepted + 40; }));
     EXPECT_EQ(mode(), Mode::fault) << "it is latched";
-    client_->send(OperatorRequest::disarm);
+    ask_until_done(*this, OperatorRequest::disarm);
     ASSERT_TRUE(becomes(*this, Mode::vent, Reason::waiting_for_arm)) << seen_text();
-    client_->send(OperatorRequest::arm);
+    ask_until_done(*this, OperatorRequest::arm);
     ASSERT_TRUE(wait_for([&] { return under_pressure(); })) << seen_text();
   }
   expect_limits(*this);

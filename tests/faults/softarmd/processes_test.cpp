@@ -77,9 +77,11 @@ TEST_P(ProcessFaults, AStoppedDaemonThrowsItsQueueAwayAndVents) {
   ASSERT_TRUE(wait_for([&] { return plant_.vented; })) << "expired commands vent";
   go_on(0.3);  // longer than vent_after_s
   daemon.signal(SIGCONT);
-  EXPECT_TRUE(wait_for([&] { return saw(Mode::vent, Reason::time_gap); })) << seen_text();
-  EXPECT_FALSE(saw(Mode::fault, Reason::valves_silent)) << seen_text();
   // Where the stop lasted long enough to fill the socket, a request may have been lost.
+  EXPECT_TRUE(wait_for([&] {
+    return saw(Mode::vent, Reason::time_gap) || saw(Mode::vent, Reason::requests_lost);
+  })) << seen_text();
+  EXPECT_FALSE(saw(Mode::fault, Reason::valves_silent)) << seen_text();
   std::int64_t armed = 0;
   EXPECT_TRUE(wait_for([&] {
     if (reason() == Reason::waiting_for_arm && armed++ % 100 == 0)

@@ -27,13 +27,12 @@ class Senders : public ValvesProgram, public ::testing::WithParamInterface<bool>
     if (IsSkipped()) return;
     client_->on_plant([this](const PlantState& plant) {
       plant_ = plant;
-      highest_bar_ = std::max(highest_bar_, largest(plant.pressure_bar));
+      highest_measured_bar_ = std::max(highest_measured_bar_, largest(plant.pressure_bar));
     });
-    node_->subscribe("SOFTARM_PRESSURE", 4096, [this](const ReceivedMessage& packet) {
-      softarm_messages::pressure_measurement_t measured;
-      if (decode(packet.bytes, measured) &&
-          measured.reason == static_cast<std::int8_t>(ValveReason::other_sender))
-        saw_other_sender_ = true;
+    client_->on_message([this](const ArmMessage& message) {
+      if (message.channel != "SOFTARM_PRESSURE" || !decode(message.bytes, measured_)) return;
+      ++measurements_;
+      saw_other_sender_ |= measured_.reason == static_cast<std::int8_t>(ValveReason::other_sender);
     });
     validity_s_ = kValidity_s;
     configure_slew(1);
@@ -50,7 +49,7 @@ class Senders : public ValvesProgram, public ::testing::WithParamInterface<bool>
     std::ofstream(config_, std::ios::app)
         << "actuation: {slew_bar_per_s: " << kSlew_bar_per_s << "}\n";
   }
-  /// As another program with separate numbers and a separate clock.
+  /// As another program with other numbers.
   void intrude(double bar) {
     softarm_messages::pressure_command_t theirs = sent_;
     theirs.sequence += 1'000'000;
@@ -59,16 +58,17 @@ class Senders : public ValvesProgram, public ::testing::WithParamInterface<bool>
   }
 
   std::unique_ptr<Process> plant_process_, valves_;
+  double highest_measured_bar_ = 0.0;
   bool saw_other_sender_ = false;
 };
 
 TEST_P(Senders, OnePacketOfAnotherProgramMovesNothingBeyondTheSlewAndVents) {
   ASSERT_TRUE(command_until(0.3, [&] { return pressure_is(0.3); })) << valves_->printed();
-  highest_bar_ = 0.0;
+  highest_measured_bar_ = 0.0;
   intrude(2.0);
   EXPECT_TRUE(command_until(0.3, [&] { return saw_other_sender_; })) << valves_->printed();
   EXPECT_TRUE(command_until(0.3, [&] { return pressure_is(0.0); })) << valves_->printed();
-  EXPECT_LT(highest_bar_, 0.3 + kMostRise_bar);
+  EXPECT_LT(highest_measured_bar_, 0.3 + kMostRise_bar);
   EXPECT_TRUE(wait_for([&] {
     return valves_->printed().find("DEGRADED (another sender)") != std::string::npos;
   })) << valves_->printed();
@@ -91,7 +91,7 @@ TEST_P(Senders, TwoProgramsAtOnceHaveNoPressureAndNoneWhenOneLeaves) {
     return saw_other_sender_;
   })) << valves_->printed();
   ASSERT_TRUE(command_until(0.3, [&] { return pressure_is(0.0); })) << valves_->printed();
-  highest_bar_ = 0.0;
+  highest_measured_bar_ = 0.0;
   const int before = measurements_;
   EXPECT_TRUE(command_until(0.3, [&] {
     intrude(0.8);
@@ -99,19 +99,19 @@ TEST_P(Senders, TwoProgramsAtOnceHaveNoPressureAndNoneWhenOneLeaves) {
   }));
   const int alone = measurements_;
   EXPECT_TRUE(command_until(0.3, [&] { return measurements_ > alone + 20; }));
-  EXPECT_LT(highest_bar_, 0.05);
+  EXPECT_LT(highest_measured_bar_, 0.05);
 }
 
 TEST_P(Senders, ANewSenderRisesWithinTheSlewToo) {
   ASSERT_TRUE(command_until(0.3, [&] { return pressure_is(0.3); })) << valves_->printed();
   ASSERT_TRUE(wait_for([&] { return pressure_is(0.0); })) << "expired";
   sent_.sequence = 0;  // it has started again
-  highest_bar_ = 0.0;
+  highest_measured_bar_ = 0.0;
   sent_.pressure_bar.assign(kChambers, 2.0F);
   publish();
   ASSERT_TRUE(wait_for([&] { return measured_.sequence == 1; })) << valves_->printed();
   ASSERT_TRUE(wait_for([&] { return measured_.sequence < 0 && pressure_is(0.0); }));
-  EXPECT_LT(highest_bar_, kMostRise_bar);
+  EXPECT_LT(highest_measured_bar_, kMostRise_bar);
 }
 
 TEST_P(Senders, AValidityThatIsNotGrantedIsReportedAndSoIsWhatExpired) {
@@ -122,9 +122,8 @@ TEST_P(Senders, AValidityThatIsNotGrantedIsReportedAndSoIsWhatExpired) {
   EXPECT_EQ(measured_.reason, 0);
   EXPECT_TRUE(wait_for([&] {
     return valves_->printed().find(
-               "commands ask to be held for 0.3 s; they expire after "
-               "daemon.lcm.command_validity_s, "
-               "0.1 s") != std::string::npos;
+               "commands ask to be held for 0.6 s; they expire after "
+               "daemon.lcm.command_validity_s, 0.3 s") != std::string::npos;
   })) << valves_->printed();
   const int expired = measured_.expired;
   EXPECT_TRUE(wait_for([&] { return measured_.expired == expired + 1; })) << valves_->printed();
@@ -136,13 +135,13 @@ TEST_P(Senders, AValidityThatIsNotGrantedIsReportedAndSoIsWhatExpired) {
 // is not of this moment.
 TEST_P(Senders, CommandsThatAreNotOfThisMomentMoveNothing) {
   const auto played_at = [&](std::int64_t offset_us) {
-    highest_bar_ = 0.0;
+    highest_measured_bar_ = 0.0;
     const int before = measurements_;
     EXPECT_TRUE(command_until(1.0, [&] {
       sent_.time_us = monotonic_now_ns() / 1000 + offset_us;
       return measurements_ > before + 30;
     }));
-    return highest_bar_;
+    return highest_measured_bar_;
   };
   EXPECT_LT(played_at(-3'600'000'000), 0.01);
   EXPECT_LT(played_at(+3'600'000'000), 0.01);

@@ -185,8 +185,11 @@ TEST_F(ValvesBehindARelay, AStoppedAndContinuedDriverVents) {
   driver_->signal(SIGSTOP);
   ASSERT_TRUE(command_until(0.3, [&] { return plant_.vented; })) << "the terminal's own time-out";
   driver_->signal(SIGCONT);
-  EXPECT_TRUE(command_until(0.3, [&] { return is(ValveState::degraded, ValveReason::time_gap); }))
-      << driver_->printed();
+  // A busy machine may stop it for so short a time that the terminal's set points alone show it.
+  EXPECT_TRUE(command_until(0.3, [&] {
+    return is(ValveState::degraded, ValveReason::time_gap) ||
+           is(ValveState::degraded, ValveReason::echo_mismatch);
+  })) << driver_->printed();
   expect_recovery();
 }
 

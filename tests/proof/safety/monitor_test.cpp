@@ -19,15 +19,14 @@ namespace {
 using proof::kEpoch_ns;
 
 constexpr std::int64_t kMs = 1'000'000;
-constexpr double kPeriod_s = 0.1;
-constexpr std::int64_t kHold = 100 * kMs, kVent = 200 * kMs, kSilence = 100 * kMs,
-                       kDeadman = 100 * kMs, kDeaf = 500 * kMs;
-constexpr int kHoldOverruns = 2, kVentOverruns = 4, kGoodFrames = 2;
+constexpr double kPeriod_s = 0.125;  // an `arm` lapses after 2.5 s with it
 /// All times are multiples of this, so that ages take few values, each threshold itself among them.
-constexpr std::int64_t kStep = 100 * kMs;
+constexpr std::int64_t kStep = 500 * kMs;
+constexpr std::int64_t kHold = kStep, kVent = 2 * kStep, kSilence = kStep, kDeadman = kStep,
+                       kDeaf = kStep, kForeign = 2 * kStep;
+constexpr int kHoldOverruns = 2, kVentOverruns = 4, kGoodFrames = 2;
 /// From one tick to the next: at the threshold of silence, at that of a stop, and beyond it.
 constexpr std::array kGaps = {kSilence, kVent, kVent + kStep};
-constexpr std::int64_t kHorizon = kVent + kStep;
 
 /// An input that raises a cause. Two that write the same member exclude each other.
 struct Trigger {
@@ -37,7 +36,7 @@ struct Trigger {
 };
 
 /// Each cause, with the least and with the usual input that raises it. A new cause needs its lines
-/// here; `EveryCauseHasItsTrigger` names it. time_gap and valves_silent follow from the times.
+/// here; `EveryCauseHasItsTrigger` names it. valves_silent and time_gap follow from the times too.
 const std::vector<Trigger> kTriggers = {
     {Reason::shutdown, 0, [](SafetyInput& in) { in.requests.shutdown = true; }},
     {Reason::emergency_stop, 1, [](SafetyInput& in) { in.requests.emergency_stop = true; }},
@@ -48,6 +47,11 @@ const std::vector<Trigger> kTriggers = {
     {Reason::deadman_released, 5,
      [](SafetyInput& in) { in.newest_go_ns = in.now_ns - kDeadman - kStep; }},
     {Reason::deadman_released, 5, [](SafetyInput& in) { in.newest_go_ns = kNever; }},
+    {Reason::requests_lost, 15, [](SafetyInput& in) { in.requests.lost = true; }},
+    {Reason::foreign_commands, 16,
+     [](SafetyInput& in) { in.newest_foreign_ns = in.now_ns - kForeign; }},
+    {Reason::oscillation, 17, [](SafetyInput& in) { in.oscillation = true; }},
+    {Reason::time_gap, 14, [](SafetyInput& in) { in.paused = true; }},
     {Reason::command_expired, 6, [](SafetyInput& in) { in.command_expired = true; }},
     {Reason::sender_restarted, 7, [](SafetyInput& in) { in.sender_restarted = true; }},
     {Reason::frames_stale, 8,
@@ -72,6 +76,7 @@ SafetyInput healthy(std::int64_t now_ns) {
   in.newest_capture_ns = now_ns - kHold;
   in.newest_measurement_ns = now_ns;
   in.newest_go_ns = now_ns - kDeadman;
+  in.newest_foreign_ns = now_ns - kForeign - kStep;
   in.consecutive_overruns = kHoldOverruns - 1;
   return in;
 }
@@ -100,6 +105,7 @@ struct Onlooker {
   std::int64_t now_ns = kEpoch_ns;
   std::int64_t stopped_ns = kNever;  ///< end of the last stop, or of commands that expired
   std::int64_t excused_ns = kNever;  ///< what valves sent before may have been lost
+  std::int64_t pending_ns = kNever;  ///< of an `arm` that has not led to ACTIVE
   int run = 0;                       ///< good frames in a row, that count
   bool may_move = false;             ///< nobody has taken the arming back since it was given
   bool ticked = false;
@@ -112,10 +118,34 @@ struct State {
   Onlooker seen;
 };
 
+}  // namespace
+
+/// What can no longer matter, so that states which differ in nothing else are visited once: the end
+/// of deafness when it has passed, and how long ago the last stop was when every measurement that
+/// may come is newer.
+struct ProofOfMonitor {
+  static void forget(State& state) {
+    Onlooker& seen = state.seen;
+    SafetyMonitor& monitor = state.monitor;
+    if (monitor.deaf_until_ns_ <= seen.now_ns) monitor.deaf_until_ns_ = kNever;
+    if (seen.stopped_ns != kNever && seen.stopped_ns + kDeaf <= seen.now_ns)
+      seen.stopped_ns = kNever;
+    for (std::int64_t* since_ns : {&monitor.listening_since_ns_, &seen.excused_ns})
+      if (*since_ns != kNever) *since_ns = std::max(*since_ns, seen.now_ns - 2 * kStep);
+  }
+};
+
+namespace {
+
 /// Its step with everything that must be true of it.
 class Judge {
  public:
-  explicit Judge(const Setup& setup) : setup_(setup) {}
+  explicit Judge(const Setup& setup)
+      : setup_(setup),
+        lapses_ns_(SafetyMonitor(settings_of(setup), kPeriod_s).thresholds().arm_lapses_ns) {}
+
+  /// Ages beyond it are all alike.
+  std::int64_t horizon_ns() const { return lapses_ns_ + kStep; }
 
   State start() const {
     alignas(State) static std::array<std::byte, sizeof(State)> zeros{};  // padding is compared too
@@ -131,7 +161,7 @@ class Judge {
     const Reason reason_before = state.monitor.reason();
     const std::int64_t gap_ns = seen.ticked ? in.now_ns - seen.now_ns : 0;
     if (seen.ticked) {
-      if (gap_ns > kVent || in.command_expired) seen.stopped_ns = in.now_ns;
+      if (gap_ns > kVent || in.paused || in.command_expired) seen.stopped_ns = in.now_ns;
       if (gap_ns > kSilence && in.newest_measurement_ns > seen.excused_ns)
         seen.excused_ns = in.now_ns;
     }
@@ -148,13 +178,22 @@ class Judge {
     const bool shutdown = in.requests.shutdown;
     const Mode demanded = worst();
 
-    // Whether the arm may move at all.
+    // Whether the arm may move at all. An `arm` is for what the operator sees, and lapses.
     const bool waiting = before <= Mode::wait_frames;
-    if (in.requests.arm && demanded < Mode::vent && before != Mode::fault && !deaf)
+    const bool controlled = before == Mode::active || before == Mode::hold;
+    const bool hindered = demanded >= Mode::vent || (demanded == Mode::hold && !controlled);
+    if (in.requests.arm && !hindered && before != Mode::fault && !deaf) {
+      if (!seen.may_move && !controlled) seen.pending_ns = in.now_ns;
       seen.may_move = true;
+    } else if (seen.pending_ns != kNever &&
+               (hindered || in.now_ns - seen.pending_ns > lapses_ns_)) {
+      seen.may_move = false;
+    }
     if (setup_.arming == Arming::explicit_ && demanded >= Mode::vent) seen.may_move = false;
-    if (in.requests.disarm || shutdown || demanded == Mode::fault) seen.may_move = false;
+    if (in.requests.disarm || in.requests.lost || shutdown || demanded == Mode::fault)
+      seen.may_move = false;
     if (!waiting && needs_operator()) seen.may_move = false;
+    if (!seen.may_move) seen.pending_ns = kNever;
 
     const bool moving = before >= Mode::vent && !in.fully_vented;
     const bool counts = present_.none() && in.bad_frames == 0 && !moving && heard && !deaf;
@@ -177,13 +216,15 @@ class Judge {
     require(state.monitor.armed() == seen.may_move, "armed as long as nobody took it back");
     require(after != Mode::hold || before == Mode::active || before == Mode::hold,
             "HOLD follows ACTIVE only");
+    if (after == Mode::active) seen.pending_ns = kNever;
     if (!active) require(after == expected(before, demanded, in), "the most severe cause wins");
-    if (in.requests.emergency_stop && !shutdown)
+    if (in.requests.emergency_stop)
       require(after == Mode::fault && reason == Reason::emergency_stop,
               "an emergency stop is FAULT");
     if (before == Mode::fault && after != Mode::fault)
-      require(in.requests.disarm || shutdown, "FAULT is left by disarming only");
-    if (shutdown) require(after == Mode::vent && reason == Reason::shutdown, "shutdown is final");
+      require(in.requests.disarm && !shutdown, "FAULT is left by disarming only");
+    if (shutdown && after != Mode::fault)
+      require(after == Mode::vent && reason == Reason::shutdown, "shutdown is final");
     check_reason(before, reason_before, after, reason, seen);
   }
 
@@ -226,15 +267,25 @@ class Judge {
   }
   /// The mode where the arm is not to become ACTIVE.
   static Mode expected(Mode before, Mode demanded, const SafetyInput& in) {
-    if (in.requests.shutdown) return Mode::vent;
+    if (in.requests.emergency_stop) return Mode::fault;
+    if (before != Mode::fault && in.requests.shutdown) return Mode::vent;
     if (before == Mode::fault)
-      return in.requests.disarm && demanded < Mode::fault ? Mode::vent : Mode::fault;
+      return in.requests.disarm && !in.requests.shutdown && demanded < Mode::fault ? Mode::vent
+                                                                                   : Mode::fault;
     if (before <= Mode::wait_frames) return demanded == Mode::fault ? demanded : Mode::wait_frames;
     return std::max(before, demanded);
   }
   void check_reason(Mode before, Reason reason_before, Mode mode, Reason reason,
                     const Onlooker& seen) const {
     if (mode == Mode::active) return require(reason == Reason::none, "ACTIVE has no reason");
+    if (mode == Mode::wait_frames) {
+      // What keeps it waiting: a cause that would vent, or frames, or only the arm.
+      Reason waits = seen.run < kGoodFrames ? Reason::waiting_for_frames : Reason::waiting_for_arm;
+      for (std::size_t k = 0; k < cause_table().size() && waits == Reason::waiting_for_frames; ++k)
+        if (present_[k] && cause_table()[k].demands == Mode::vent) waits = cause_table()[k].reason;
+      if (waits == Reason::frames_stale) waits = Reason::waiting_for_frames;
+      return require(reason == waits, "WAIT_FRAMES names what it waits for");
+    }
     if (reason == Reason::waiting_for_arm)
       return require(
           !seen.may_move && seen.run == kGoodFrames && present_.none() && mode != Mode::fault,
@@ -249,17 +300,10 @@ class Judge {
     for (std::size_t k = 0; k < cause_table().size(); ++k) {
       const CauseRule& rule = cause_table()[k];
       const bool wins = rule.demands == mode || rule.clearance == Clearance::never;
-      const bool keeps = mode == Mode::fault && before == Mode::fault &&
-                         rule.reason != Reason::emergency_stop &&
-                         rule.clearance != Clearance::never;
+      const bool keeps =
+          mode == Mode::fault && before == Mode::fault && rule.reason != Reason::emergency_stop;
       if (!present_[k] || !wins || keeps) continue;
       return require(reason == rule.reason, "the reason is the most severe cause");
-    }
-    if (mode == Mode::wait_frames) {
-      bool named = false;
-      for (std::size_t k = 0; k < cause_table().size(); ++k)
-        named |= present_[k] && cause_table()[k].reason == reason;
-      return require(named || reason == reason_before, "the reason is present");
     }
     if (mode == Mode::vent && reason_before == Reason::waiting_for_arm && present_.any()) {
       std::size_t first = 0;
@@ -270,6 +314,7 @@ class Judge {
   }
 
   Setup setup_;
+  std::int64_t lapses_ns_;
   mutable std::bitset<64> present_;  ///< rows of the table
 };
 
@@ -303,7 +348,8 @@ std::string text(const std::vector<Input>& way, const Setup& setup) {
 
 class Exploration {
  public:
-  explicit Exploration(const Setup& setup) : setup_(setup), judge_(setup), frontier_(kHorizon) {
+  explicit Exploration(const Setup& setup)
+      : setup_(setup), judge_(setup), frontier_(judge_.horizon_ns()) {
     const int count = static_cast<int>(kTriggers.size());
     sets_.push_back({-1, -1});
     for (int a = 0; a < count; ++a) sets_.push_back({a, -1});
@@ -341,9 +387,10 @@ class Exploration {
           if (frontier_[index].seen.vented && !in.fully_vented) continue;
           in.bad_frames = bits & 4 ? 1 : 0;
           in.good_frames = 1;
-          // Pairs where everything else would let the arm go on.
-          const bool all = measured_ns == now_ns && !(bits & 4);
-          const std::size_t sets = all ? sets_.size() : singles_;
+          // Pairs where everything else would let the arm go on; the rest of the measurements alone.
+          const bool usual = gap_ns == kGaps[0] && measured_ns == now_ns && !(bits & 4);
+          const bool plain = measured_ns == now_ns || measured_ns == now_ns - kSilence - kStep;
+          const std::size_t sets = usual ? sets_.size() : plain ? singles_ : 1;
           for (std::size_t k = 0; k < sets; ++k) step(index, in, sets_[k]);
         }
         if (!setup_.watches) break;
@@ -373,6 +420,7 @@ class Exploration {
       way.push_back({in, triggers});
       throw std::runtime_error(violated.what() + text(way, setup_));
     }
+    ProofOfMonitor::forget(next);
     frontier_.add(next, in.now_ns, index, {in, triggers});
   }
 
@@ -409,7 +457,7 @@ class Exploration {
 
 TEST(MonitorProof, EveryCauseHasItsTrigger) {
   for (const CauseRule& rule : cause_table()) {
-    bool found = rule.reason == Reason::time_gap || rule.reason == Reason::valves_silent;
+    bool found = rule.reason == Reason::valves_silent;
     for (const Trigger& trigger : kTriggers) found |= trigger.reason == rule.reason;
     EXPECT_TRUE(found) << name(rule.reason);
   }

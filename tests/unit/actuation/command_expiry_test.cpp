@@ -57,8 +57,68 @@ TEST_F(Expiry, OlderAndRepeatedSequencesNeitherActNorProlong) {
 
 TEST_F(Expiry, ASenderMayStartAgainOnceTheArmIsVented) {
   expiry.receive(command(1'000'000), 0);
-  EXPECT_EQ(expiry.receive(command(0), 50 * kMs), CommandVerdict::older);
+  EXPECT_EQ(expiry.receive(command(0), 50 * kMs), CommandVerdict::other_sender);
   EXPECT_EQ(expiry.receive(command(0), 100 * kMs), CommandVerdict::in_force);
+}
+
+// Two senders with one clock or with two: numbers and times do not go on together.
+TEST_F(Expiry, OnlyOneSenderIsObeyedAtATime) {
+  const auto at = [&](std::int64_t sequence, std::int64_t sent_us) {
+    PressureCommand it = command(sequence);
+    it.sent_us = sent_us;
+    return it;
+  };
+  const auto receive = [&](const PressureCommand& second, std::int64_t second_ns) {
+    CommandExpiry fresh(2);
+    EXPECT_EQ(fresh.receive(at(1000, 7'000'000), 7'000 * kMs), CommandVerdict::in_force);
+    const CommandVerdict verdict = fresh.receive(second, second_ns);
+    EXPECT_EQ(fresh.sequence(), verdict == CommandVerdict::in_force ? second.sequence : 1000);
+    return verdict;
+  };
+  const std::int64_t now_ns = 7'002 * kMs;
+  using enum CommandVerdict;
+  EXPECT_EQ(receive(at(1001, 7'002'000), now_ns), in_force);
+  EXPECT_EQ(receive(at(1050, 7'050'000), 7'090 * kMs), in_force) << "some were lost";
+  EXPECT_EQ(receive(at(1000, 7'000'000), now_ns), older) << "sent twice by the network";
+  EXPECT_EQ(receive(at(998, 6'996'000), now_ns), older) << "overtaken";
+  EXPECT_EQ(receive(at(1000, 7'001'000), now_ns), other_sender) << "the same number again";
+  EXPECT_EQ(receive(at(990, 7'001'000), now_ns), other_sender) << "an old number, a new time";
+  EXPECT_EQ(receive(at(1, 7'001'000), now_ns), other_sender) << "it has started again";
+  EXPECT_EQ(receive(at(900, 6'800'000), now_ns), other_sender) << "no packet is so late";
+  EXPECT_EQ(receive(at(1001, 6'999'000), now_ns), other_sender) << "a new number, an old time";
+  EXPECT_EQ(receive(at(1001, 9'000'000'000), now_ns), other_sender) << "another machine's clock";
+  EXPECT_EQ(receive(at(999, 1), now_ns), other_sender) << "another machine's clock";
+  EXPECT_EQ(receive(at(1001, 0), now_ns), other_sender) << "it gives no time";
+  EXPECT_EQ(receive(at(1001, INT64_MAX), now_ns), other_sender);
+  EXPECT_EQ(receive(at(1001, INT64_MIN), now_ns), other_sender);
+  // A higher number is taken if nothing else betrays it; then the first sender is the other one.
+  ASSERT_EQ(expiry.receive(at(1000, 7'000'000), 7'000 * kMs), in_force);
+  ASSERT_EQ(expiry.receive(at(5000, 7'001'000), 7'001 * kMs), in_force);
+  EXPECT_EQ(expiry.receive(at(1001, 7'002'000), 7'002 * kMs), other_sender);
+  EXPECT_EQ(expiry.receive(at(1002, 7'150'000), 7'150 * kMs), in_force) << "it has expired";
+}
+
+TEST_F(Expiry, WhereSendersGiveNoTimeNumbersAloneDecide) {
+  ASSERT_EQ(expiry.receive(command(1000), 0), CommandVerdict::in_force);
+  EXPECT_EQ(expiry.receive(command(1000), 1), CommandVerdict::older);
+  EXPECT_EQ(expiry.receive(command(984), 2), CommandVerdict::older);
+  EXPECT_EQ(expiry.receive(command(983), 3), CommandVerdict::other_sender);
+  EXPECT_EQ(expiry.receive(command(INT64_MAX), 4), CommandVerdict::in_force);
+  EXPECT_EQ(expiry.receive(command(1001), 5), CommandVerdict::other_sender);
+}
+
+TEST(Untimely, IsWhatWasNotSentNow) {
+  constexpr std::int64_t kNow = 50'000'000, kValidity = 100'000;
+  EXPECT_FALSE(is_untimely(kNow, kValidity, kNow));
+  EXPECT_FALSE(is_untimely(kNow - kValidity + 1, kValidity, kNow));
+  EXPECT_TRUE(is_untimely(kNow - kValidity, kValidity, kNow));
+  EXPECT_FALSE(is_untimely(kNow + kValidity, kValidity, kNow));
+  EXPECT_TRUE(is_untimely(kNow + kValidity + 1, kValidity, kNow)) << "of an earlier boot";
+  EXPECT_TRUE(is_untimely(-5, kValidity, kNow));
+  EXPECT_TRUE(is_untimely(INT64_MIN, kValidity, kNow));
+  EXPECT_TRUE(is_untimely(INT64_MAX, kValidity, kNow));
+  EXPECT_FALSE(is_untimely(0, kValidity, kNow)) << "unknown";
+  EXPECT_FALSE(is_untimely(1'700'000'000'000'000, kValidity, kNow)) << "the wall clock";
 }
 
 TEST_F(Expiry, ShadowCommandsNeverReachTheValves) {

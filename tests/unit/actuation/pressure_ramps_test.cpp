@@ -9,6 +9,16 @@
 namespace softarm {
 namespace {
 
+TEST(RiseTowards, LimitsTheWayFromZeroAndNotTheWayToIt) {
+  EXPECT_EQ(rise_towards(0.5, 2.0, 0.1), 0.6);
+  EXPECT_EQ(rise_towards(0.5, 0.55, 0.1), 0.55);
+  EXPECT_EQ(rise_towards(0.5, 0.0, 0.1), 0.0);
+  EXPECT_EQ(rise_towards(-0.5, -2.0, 0.25), -0.75);
+  EXPECT_EQ(rise_towards(0.5, -2.0, 0.25), -0.25) << "through zero";
+  EXPECT_EQ(rise_towards(0.5, 2.0, -1.0), 0.5);
+  EXPECT_EQ(rise_towards(0.5, std::nan(""), 1.0), 0.0);
+}
+
 ActuationSettings limits() {
   ActuationSettings settings;
   settings.min_pressure_bar = 0.1;

@@ -42,6 +42,14 @@ TEST_F(NetworkSearch, FollowsIncludesAndWhatComesLaterCounts) {
   EXPECT_EQ(lcm.status_channel, "HERE");
 }
 
+TEST_F(NetworkSearch, FollowsIncludesBesideTheFileBehindALink) {
+  std::filesystem::create_directories(folder_ / "real");
+  write("real/base.yaml", "daemon: {lcm: {url: \"udpm://239.1.1.5:5\"}}\n");
+  write("real/arm.yaml", "include: base.yaml\n");
+  std::filesystem::create_symlink("real/arm.yaml", folder_ / "link.yaml");
+  EXPECT_EQ(find_network(folder_ / "link.yaml").url, "udpm://239.1.1.5:5");
+}
+
 TEST_F(NetworkSearch, EndsWhereFilesIncludeOneAnotherOrAreNotThere) {
   const LcmSettings lcm =
       find_network(write("round.yaml", "include: round.yaml\nurl: udpm://239.1.1.3:3\n"));

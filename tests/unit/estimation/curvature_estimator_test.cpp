@@ -181,12 +181,12 @@ TEST(CurvatureEstimator, LengthIsMeasuredByTheChord) {
 }
 
 TEST(CurvatureEstimator, LengthIsAsNoisyAsReported) {
-  // 0.2 mm of relative position, 3.5 mrad a body; the sizes to expect from the closed form.
-  constexpr double kSigma_m = 0.2e-3 / std::numbers::sqrt2, kSigma_rad = 3.5e-3;
+  // Below a fixed base; the sizes to expect from the closed form, with theta weighted.
+  constexpr double kSigma_m = 0.2e-3, kSigma_rad = 3.5e-3;
   constexpr double kLength_m = 0.12;
-  const std::vector<BodyNoise> noise(2, {kSigma_m, kSigma_rad});
-  const CurvatureEstimator estimator =
-      estimator_of(CurvatureMethod::pose, arm_of(1, kLength_m), noise);
+  const CurvatureEstimator estimator = estimator_of(CurvatureMethod::pose, arm_of(1, kLength_m),
+                                                    {BodyNoise{}, {kSigma_m, kSigma_rad}});
+  const BodyPose upper = body_at(Eigen::Isometry3d::Identity());
   std::mt19937 random(1);
   for (const auto& [theta, expected_mm] :
        {std::pair{0.0, 0.200}, std::pair{0.4, 0.202}, std::pair{pi / 2, 0.226},
@@ -195,8 +195,6 @@ TEST(CurvatureEstimator, LengthIsAsNoisyAsReported) {
     const Eigen::Isometry3d end = arc_end(kLength_m, 0.3, theta);
     double sum = 0.0, squares = 0.0, mixed = 0.0, variance = 0.0, covariance = 0.0;
     for (int k = 0; k < kDraws; ++k) {
-      const auto upper =
-          test::disturbed(body_at(Eigen::Isometry3d::Identity()), kSigma_m, kSigma_rad, random);
       const auto lower = test::disturbed(body_at(end), kSigma_m, kSigma_rad, random);
       const SegmentCurvature one = estimator.segment(0, upper, lower);
       ASSERT_TRUE(one.valid);

@@ -46,9 +46,9 @@ class DaemonLinkOverUdp : public ::testing::Test {
     }
   }
 
-  std::unique_ptr<DaemonLink> make_link() const {
+  std::unique_ptr<DaemonLink> make_link(bool shadow = false) const {
     return std::make_unique<DaemonLink>(settings, transport,
-                                        Provenance{.version = "test", .build = "build"}, false);
+                                        Provenance{.version = "test", .build = "build"}, shadow);
   }
 
   void ask(std::int64_t sequence, std::int8_t request, std::int64_t nonce) {
@@ -124,6 +124,7 @@ TEST_F(DaemonLinkOverUdp, TenThousandTicksAllocateNothing) {
   LoopTiming timing;
   const LcmSettings& lcm = transport.lcm;
   pressure_measurement_t measurement = test::example<pressure_measurement_t>(3, 4);
+  measurement.sequence = 1;  // some command is in force
   curvature_reference_t reference = test::example<curvature_reference_t>(3, 4);
   operator_command_t operator_command{
       .sequence = 0, .nonce = 0, .request = operator_command_t::ARM};
@@ -209,6 +210,41 @@ TEST_F(DaemonLinkOverUdp, WhatWasDecidedBeforeTheValvesVentedIsNotSentAfterIt) {
   EXPECT_EQ(heard.sequence, 3);
   EXPECT_FALSE(link->collect(now_ns + 1000).command_expired);
   EXPECT_EQ(link->unsent(), 1);
+}
+
+// Commands may have been lost on the way although this side sent them in time.
+TEST_F(DaemonLinkOverUdp, ValvesThatReportThatTheyHaveVentedAreACommandThatExpired) {
+  settings.safety.valve_readback = false;  // heard all the same
+  link = std::make_unique<DaemonLink>(settings, transport, Provenance{"", 0, 0, "build"}, false);
+  TickOutput output;
+  output.pressure_bar = PressureVector::Constant(12, 0.5);
+  pressure_measurement_t report = test::example<pressure_measurement_t>(3, 4);
+  const auto expired = [](const TickInput& input) { return input.command_expired; };
+  link->publish_command(now_ns, output);
+  sender->publish(transport.lcm.measurement_channel, report);
+  EXPECT_TRUE(nothing_comes(expired)) << "in force";
+
+  report.sequence = -1;
+  sender->publish(transport.lcm.measurement_channel, report);
+  ASSERT_TRUE(collect_until(expired));
+  EXPECT_TRUE(link->collect(now_ns).command_expired) << "until they report one";
+  report.sequence = 6;
+  sender->publish(transport.lcm.measurement_channel, report);
+  ASSERT_TRUE(collect_until([](const TickInput& input) { return !input.command_expired; }));
+
+  // The report of the vent was lost too; the next one counts it.
+  ++report.expired;
+  sender->publish(transport.lcm.measurement_channel, report);
+  ASSERT_TRUE(collect_until(expired));
+  EXPECT_FALSE(link->collect(now_ns).command_expired) << "once";
+
+  // They grant less than commands ask for, so commands expire earlier.
+  const std::int64_t granted_ns = to_ns(settings.safety.command_validity_s) / 2;
+  report.validity_us = static_cast<std::int32_t>(granted_ns / 1000);
+  sender->publish(transport.lcm.measurement_channel, report);
+  ASSERT_TRUE(collect_until([&](const TickInput&) { return link->held_us() < link->asked_us(); }));
+  EXPECT_FALSE(link->collect(now_ns + granted_ns - 1000).command_expired);
+  EXPECT_TRUE(link->collect(now_ns + granted_ns).command_expired);
 }
 
 TEST_F(DaemonLinkOverUdp, AFloodIsBoundedWork) {
@@ -297,6 +333,13 @@ TEST_F(DaemonLinkOverUdp, AnArmMustEchoAStatusOfTheLastSecondSinceTheLastStop) {
   link = make_link();
   ask(++number, kArm, before + 1'000'000);
   EXPECT_TRUE(nothing_comes(arms));
+}
+
+// Nobody echoes its status.
+TEST_F(DaemonLinkOverUdp, AShadowIsArmedWithTheDaemonThatCommands) {
+  link = make_link(true);
+  ask(1, kArm, 0);
+  EXPECT_TRUE(collect_until(arms));
 }
 
 TEST_F(DaemonLinkOverUdp, AnArmFromBeforeAVentIsRefused) {

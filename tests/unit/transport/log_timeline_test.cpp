@@ -66,8 +66,7 @@ class Timeline : public ::testing::Test {
       EXPECT_TRUE(arrival_ns);
       EXPECT_GE(*arrival_ns, newest_ns) << "the line never runs back";
       newest_ns = *arrival_ns;
-      found.push_back(1e-9 * static_cast<double>(*arrival_ns) -
-                      1e-6 * static_cast<double>(kWall_us + each.true_us));
+      found.push_back(to_seconds(*arrival_ns - 1000 * (kWall_us + each.true_us)));
     }
     return found;
   }

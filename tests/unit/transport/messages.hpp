@@ -86,11 +86,11 @@ inline softarm_messages::torque_command_t example(int segments, int /*chambers*/
 
 template <>
 inline softarm_messages::pressure_measurement_t example(int segments, int chambers) {
-  return {.sequence = -1,
+  return {.sequence = 5,
           .time_us = 44,
           .expired = 3,
           .validity_us = 0,
-          .reason = 1,
+          .reason = 0,
           .num_chambers = static_cast<std::int16_t>(segments * chambers),
           .pressure_bar = numbers<float>(segments * chambers, 0.125)};
 }

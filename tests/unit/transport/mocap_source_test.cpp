@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <random>
+#include <softarm_messages/mocap_frame_t.hpp>
 #include <softarm_messages/optitrack_frame_t.hpp>
 #include <softarm_messages/rigid_transform_t.hpp>
 
@@ -83,6 +84,54 @@ void expect_pose(const BodyPose& pose, const Eigen::Isometry3d& truth, double to
   EXPECT_TRUE(pose.valid);
   EXPECT_LT((pose.position_m - truth.translation()).norm(), tolerance);
   EXPECT_LT((pose.orientation.toRotationMatrix() - truth.linear()).norm(), tolerance);
+}
+
+/// A sender on a clock of 15.6 ms grain, or on one that stands still: frames keep apart in time.
+TEST(MocapSource, WhereStampsRepeatArrivalsCount) {
+  for (const std::int64_t grain_us : {15'625LL, 1'000'000'000LL}) {
+    std::mt19937 random(3);
+    const TransportSettings transport = foreign("softarm", random);
+    SafetySettings safety;
+    safety.frame_latency_s = 0.002;
+    MocapSource source(transport, safety, two_segments());
+    MocapFrame frame;
+    std::int64_t before_ns = 0;
+    for (std::int64_t k = 0; k < 400; ++k) {
+      mocap_frame_t message{};
+      message.frame_number = k + 1;
+      message.capture_time_us = 5000 * k / grain_us * grain_us;
+      const std::int64_t arrival_ns = 1'000'000'000 + 5'000'000 * k;
+      ASSERT_EQ(source.take(0, encoded(message), arrival_ns, frame), MocapReceipt::frame);
+      if (k > 20) {
+        EXPECT_EQ(frame.capture_ns, arrival_ns - 2'000'000) << k;
+        EXPECT_GT(frame.capture_ns, before_ns);
+      }
+      before_ns = frame.capture_ns;
+    }
+  }
+}
+
+/// A packet that comes twice is no sign of a coarse clock.
+TEST(MocapSource, WherePacketsRepeatStampsCount) {
+  std::mt19937 random(3);
+  const TransportSettings transport = foreign("softarm", random);
+  MocapSource source(transport, {}, two_segments());
+  MocapFrame frame;
+  for (std::int64_t k = 0; k < 400; ++k) {
+    mocap_frame_t message{};
+    message.frame_number = k / 2 + 1;
+    message.capture_time_us = 5000 * (k / 2);
+    const std::int64_t late_ns = k % 2 == 0 ? 0 : 2'000'000;
+    ASSERT_EQ(
+        source.take(0, encoded(message), 1'000'000'000 + 5'000'000 * (k / 2) + late_ns, frame),
+        MocapReceipt::frame);
+  }
+  const std::int64_t exact_ns = frame.capture_ns;
+  mocap_frame_t last{};
+  last.frame_number = 201;
+  last.capture_time_us = 5000 * 200;
+  source.take(0, encoded(last), 1'000'000'000 + 5'000'000 * 200 + 3'000'000, frame);
+  EXPECT_EQ(frame.capture_ns - exact_ns, 5'000'000) << "by its stamp, however late it comes";
 }
 
 TEST(MocapSource, OptitrackFramesBecomePosesOfTheSegmentsEnds) {

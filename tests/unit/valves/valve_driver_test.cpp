@@ -194,8 +194,8 @@ TEST_F(Driver, HardwareThatTakesNoZeroGetsNoFurtherRequest) {
   commanding = false;
   ASSERT_TRUE(reach(ValveState::disconnected));
   EXPECT_EQ(text(),
-            "DISCONNECTED (pressure does not fall): nowhere: chamber 1 reads 1.000 bar; no request "
-            "is sent, so that it vents by itself");
+            "DISCONNECTED (pressure does not fall): nowhere: chamber 1 reads 1.000 bar; nothing is "
+            "sent, so that it vents by itself");
   EXPECT_EQ(hardware.calls.back(), "close");
   EXPECT_EQ(hardware.calls[hardware.calls.size() - 2], "write") << "of the cycle before";
   hardware.calls.clear();

@@ -75,6 +75,7 @@ class Scene {
                 fmt::format("softarm_bench_loop_{}", getpid())) {
     std::filesystem::create_directories(folder_);
     const int second_ticks = static_cast<int>(options.rate_hz);  // the longest allowed
+    setenv("XDG_STATE_HOME", folder_.c_str(), 1);                // of the daemon
     std::ofstream(folder_ / "loop.yaml") << fmt::format(
         "include: {}\nname: bench_loop\nreference: [{{kind: set_point, theta_rad: {}}}]\n"
         "daemon:\n  rate_hz: {}\n  capture_time: latency\n"

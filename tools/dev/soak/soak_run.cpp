@@ -56,6 +56,7 @@ SoakRun::SoakRun(const SoakOptions& options)
              .record = {}},
       replace_until_s_(std::min(0.25 * options.duration_s, 300.0)),
       warm_up_s_(replace_until_s_ + std::min(0.125 * options.duration_s, 60.0)) {
+  setenv("XDG_STATE_HOME", std::filesystem::absolute(options.folder).c_str(), 1);  // of the daemon
   if (experiment_.actuation.kind == ActuationKind::torque)
     throw ConfigError(options.config, 0, "actuation.kind",
                       "chambers: a soak watches pressures and valves", "torque");

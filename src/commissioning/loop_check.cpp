@@ -1,0 +1,245 @@
+#include "softarm/commissioning/loop_check.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+
+#include "softarm/simulation/lock_step.hpp"
+#include "softarm/simulation/plant_error.hpp"
+
+namespace softarm {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kLeastGainMargin = 1.25;
+
+// The blow, and the windows in which the disturbance is compared.
+constexpr double kAfterJoining_s = 1.0, kBlow_s = 0.01, kBlowPart = 0.02;
+constexpr double kEarly_s = 0.3, kLate_s = 4.3, kWindow_s = 0.5;
+constexpr std::size_t kPhases = 6;  ///< at most, of the reference
+
+/// Nothing but the loop decides how long the arm is ACTIVE.
+Experiment undisturbed(Experiment e) {
+  SafetySettings& safety = e.safety;
+  safety.arming = Arming::automatic;
+  safety.deadman = safety.valve_readback = false;
+  safety.curvature_residual_nm = safety.oscillation_rad = safety.length_fault = 0.0;
+  return e;
+}
+
+double blow_at_s(const Experiment& e) {
+  const double active_s = e.safety.good_frames / e.plant.mocap.rate_hz + e.plant.mocap.latency_s;
+  return active_s + e.control.blend_s + kAfterJoining_s;
+}
+
+/// A force that bends the softest segment by kBlowPart rad or so if it lasted.
+ExternalLoad blow(const Experiment& e) {
+  double length_m = 0.0, stiffness_nm = kInfinity;
+  for (const SegmentParameters& segment : e.plant.arm.segments) {
+    length_m += segment.length_m;
+    stiffness_nm = std::min(stiffness_nm, segment.stiffness_nm_per_rad);
+  }
+  const double size_n = kBlowPart * std::max(stiffness_nm, 1e-3) / length_m;
+  ExternalLoad load;
+  load.force_n = Eigen::Vector3d(size_n, 0.5 * size_n, 0.0);
+  load.shape = LoadShape::half_sine;
+  load.start_s = blow_at_s(e);
+  load.duration_s = kBlow_s;
+  return load;
+}
+
+/// Spread about its mean of the difference of two motions, over a window.
+class Spread {
+ public:
+  void add(const SegmentVector& difference) {
+    if (sum_.size() == 0) sum_.setZero(difference.size());
+    sum_ += difference;
+    squares_ += difference.squaredNorm();
+    ++count_;
+  }
+  double value() const {
+    const double n = static_cast<double>(count_);
+    return std::sqrt(std::max(squares_ / n - (sum_ / n).squaredNorm(), 0.0));
+  }
+
+ private:
+  SegmentVector sum_;
+  double squares_ = 0.0;
+  int count_ = 0;
+};
+
+/// One way in which an arm differs, at the edge of what is uncertain: -1, 0 or 1 times the
+/// declared relative deviation.
+struct Corner {
+  const char* name;
+  int gain, stiffness, damping, mass, length;
+  bool payload;
+};
+constexpr Corner kCorners[] = {{"as configured", 0, 0, 0, 0, 0, false},
+                               {"with the payload", 0, 0, 0, 0, 0, true},
+                               {"soft, light and strong", 1, -1, -1, -1, -1, false},
+                               {"soft, heavy and strong, with the payload", 1, -1, -1, 1, 1, true},
+                               {"stiff, light and weak", -1, 1, -1, -1, 1, false}};
+
+void scale_gain(Experiment& e, double factor) {
+  for (auto& chambers : e.plant.actuation.segments)
+    for (Chamber& chamber : chambers) chamber.gain_nm_per_bar *= factor;
+}
+
+Experiment at(const Corner& corner, Experiment e) {
+  const double part = e.uncertainty.parameters;
+  for (SegmentParameters& segment : e.plant.arm.segments) {
+    segment.stiffness_nm_per_rad *= 1.0 + corner.stiffness * part;
+    segment.damping_nms_per_rad *= 1.0 + corner.damping * part;
+    segment.mass_kg *= 1.0 + corner.mass * part;
+    segment.length_m *= 1.0 + corner.length * part;
+  }
+  scale_gain(e, 1.0 + corner.gain * part);
+  if (corner.payload) e.plant.payload_kg.back() = e.uncertainty.payload_kg;
+  return e;
+}
+
+struct Place {
+  std::string name;
+  ReferenceSettings reference;
+};
+
+std::vector<Place> places(const Experiment& e) {
+  const std::vector<double> straight(static_cast<std::size_t>(e.arm.dof()), 0.0);
+  std::vector<Place> out;
+  // Polar gains K_P / theta^2 have no meaning at theta = 0, which (24) only passes.
+  if (e.control.coordinates == ControlCoordinates::u)
+    out.push_back({"straight", {{{SetPointReference{straight}, 0.0}}}});
+  const auto& phases = e.reference.phases;
+  for (std::size_t i = 0; i < std::min(phases.size(), kPhases); ++i) {
+    if (phases[i].kind.get_if<LiveReference>() != nullptr) continue;
+    out.push_back({fmt::format("reference[{}]", i), {{{phases[i].kind, 0.0}}}});
+  }
+  return out;
+}
+
+/// The largest value up to `most` that leaves the loop stable, by bisection; `none` is known to.
+double largest_stable(double none, double most, double exactness,
+                      const std::function<bool(double)>& stable) {
+  if (stable(most)) return most;
+  while (most - none > exactness) {
+    const double middle = 0.5 * (none + most);
+    (stable(middle) ? none : most) = middle;
+  }
+  return none;
+}
+
+void find_margins(const Experiment& experiment, LoopMargins& margins) {
+  if (!(margins.at.growth_1ps < 0.0)) return;
+  const auto stable = [&](double gain, double delay_s) {
+    Experiment changed = experiment;
+    scale_gain(changed, gain);
+    changed.plant.valves.dead_time_s += delay_s;
+    return disturbance_growth_1ps(changed) < 0.0;
+  };
+  margins.gain =
+      largest_stable(1.0, kLargestGainMargin, 0.02, [&](double gain) { return stable(gain, 0.0); });
+  margins.delay_s = largest_stable(0.0, kLargestDelayMargin_s, 0.5e-3,
+                                   [&](double delay_s) { return stable(1.0, delay_s); });
+}
+
+}  // namespace
+
+Experiment on_declared_arm(Experiment e) {
+  PlantSettings plant;
+  plant.arm = e.arm;
+  plant.actuation = e.actuation;
+  plant.valves.lag_s = e.control.valve_lag_s;
+  plant.valves.dead_time_s = e.control.dead_time_s;
+  plant.valves.supply_pressure_bar = e.actuation.max_pressure_bar;
+  plant.mocap.rate_hz = 1.0 / e.safety.frame_period_s;
+  plant.mocap.latency_s = e.safety.frame_latency_s;
+  // The observer tunes itself by what it sees.
+  plant.mocap.position_noise_m = e.estimation.position_noise_m;
+  plant.mocap.orientation_noise_rad = e.estimation.orientation_noise_rad;
+  plant.initial_u_rad = SegmentVector::Zero(e.arm.dof());
+  plant.payload_kg.assign(e.arm.segments.size(), 0.0);
+  e.plant = plant;
+  return e;
+}
+
+double disturbance_growth_1ps(const Experiment& asked) {
+  const Experiment calm = undisturbed(asked);
+  Experiment hit = calm;
+  hit.plant.loads.push_back(blow(calm));
+  const double blow_s = blow_at_s(calm);
+  Spread early, late;
+  try {
+    LockStep calm_steps(calm, calm.plant), hit_steps(hit, hit.plant);
+    LogRow calm_row, hit_row;
+    bool was_active = false;
+    const double end_s = blow_s + kLate_s + kWindow_s;
+    const auto ticks = std::llround(end_s * calm.rate_hz);
+    for (std::int64_t k = 0; k < ticks; ++k) {
+      const double since_s = static_cast<double>(k) / calm.rate_hz - blow_s;
+      const bool judged =
+          (since_s >= kEarly_s && since_s < kEarly_s + kWindow_s) || since_s >= kLate_s;
+      calm_steps.step(calm_row, judged);
+      hit_steps.step(hit_row, judged);
+      const bool active = calm_steps.pipeline().output().mode == Mode::active &&
+                          hit_steps.pipeline().output().mode == Mode::active;
+      if (was_active && !active) return kInfinity;
+      was_active = active;
+      if (judged) (since_s < kLate_s ? early : late).add(hit_row.truth - calm_row.truth);
+    }
+    if (!was_active) return kInfinity;
+  } catch (const PlantError&) {
+    return kInfinity;
+  }
+  // Where the arm does not move at all nothing grows.
+  if (!(early.value() > 0.0)) return -kInfinity;
+  return std::log(late.value() / early.value()) / (kLate_s - kEarly_s);
+}
+
+LoopCheck check_loop(const Experiment& asked) {
+  const Experiment declared = on_declared_arm(asked);
+  LoopCheck check;
+  Experiment worst_configured, worst;
+  for (const Place& place : places(declared)) {
+    for (const Corner& corner : kCorners) {
+      Experiment experiment = at(corner, declared);
+      experiment.reference = place.reference;
+      const LoopFinding finding{corner.name, place.name, disturbance_growth_1ps(experiment)};
+      check.findings.push_back(finding);
+      const auto keep_worst = [&](LoopMargins& margins, Experiment& kept) {
+        if (!margins.at.arm.empty() && finding.growth_1ps <= margins.at.growth_1ps) return;
+        margins.at = finding;
+        kept = experiment;
+      };
+      if (&corner == kCorners) keep_worst(check.configured, worst_configured);
+      keep_worst(check.worst, worst);
+    }
+  }
+  find_margins(worst_configured, check.configured);
+  find_margins(worst, check.worst);
+  return check;
+}
+
+std::vector<std::string> loop_warnings(const LoopCheck& check) {
+  std::vector<std::string> out;
+  for (const LoopFinding& finding : check.findings) {
+    if (finding.growth_1ps < 0.0) continue;
+    out.push_back(
+        std::isfinite(finding.growth_1ps)
+            ? fmt::format(
+                  "the loop is unstable on the arm {}, {}: a disturbance grows by {:.3g} 1/s",
+                  finding.arm, finding.where, finding.growth_1ps)
+            : fmt::format("the loop does not stay ACTIVE on the arm {}, {}", finding.arm,
+                          finding.where));
+  }
+  if (out.empty() && check.worst.gain < kLeastGainMargin) {
+    out.push_back(fmt::format("the loop is close to unstable on the arm {}, {}: gain margin {:.2f}",
+                              check.worst.at.arm, check.worst.at.where, check.worst.gain));
+  }
+  return out;
+}
+
+}  // namespace softarm
