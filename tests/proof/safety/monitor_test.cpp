@@ -181,9 +181,10 @@ class Judge {
     // Whether the arm may move at all. An `arm` is for what the operator sees, and lapses.
     const bool waiting = before <= Mode::wait_frames;
     const bool controlled = before == Mode::active || before == Mode::hold;
-    const bool hindered = demanded >= Mode::vent || (demanded == Mode::hold && !controlled);
+    const bool lapses = setup_.arming == Arming::explicit_ && !controlled;
+    const bool hindered = demanded >= Mode::vent || (demanded == Mode::hold && lapses);
     if (in.requests.arm && !hindered && before != Mode::fault && !deaf) {
-      if (!seen.may_move && !controlled) seen.pending_ns = in.now_ns;
+      if (!seen.may_move && lapses) seen.pending_ns = in.now_ns;
       seen.may_move = true;
     } else if (seen.pending_ns != kNever &&
                (hindered || in.now_ns - seen.pending_ns > lapses_ns_)) {
