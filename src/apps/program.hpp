@@ -13,6 +13,7 @@ enum ExitCode : int {
   kExitOk = 0,
   kExitFailure = 1,         ///< anything not listed here
   kExitDifferent = 2,       ///< softarm replay: a command or status is not what was recorded
+  kExitNotChecked = 3,      ///< softarm check --live: nothing failed, but not all was checked
   kExitUsage = 64,          ///< the command line is wrong
   kExitData = 65,           ///< a log is damaged, or lacks what it was read for
   kExitOtherInstance = 75,  ///< another instance holds the command channel

@@ -11,6 +11,7 @@
 #include <stdexcept>
 
 #include "config/describe.hpp"
+#include "config/plausibility.hpp"
 #include "softarm/actuation/pressure_allocator.hpp"
 #include "softarm/base/time.hpp"
 #include "softarm/control/curvature_controller.hpp"
@@ -342,6 +343,7 @@ class Checks {
 
 void check_consistency(const Experiment& experiment, const ConfigKeys& keys) {
   Checks(experiment, keys).run();
+  check_plausibility(experiment, keys);
 }
 
 }  // namespace softarm

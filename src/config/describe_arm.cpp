@@ -37,7 +37,7 @@ void describe_arm(Keys& key, ArmParameters& it, Presence presence) {
   using Segment = SegmentParameters;
   each("length_m", &Segment::length_m, above(0, 10), "of all segments, or a list", presence);
   each("mass_kg", &Segment::mass_kg, above(0, 100), "of all segments, or a list", presence);
-  each("stiffness_nm_per_rad", &Segment::stiffness_nm_per_rad, from(0, 1e4),
+  each("stiffness_nm_per_rad", &Segment::stiffness_nm_per_rad, above(0, 1e4),
        "bending stiffness k of (14)", presence);
   each("damping_nms_per_rad", &Segment::damping_nms_per_rad, from(0, 1e3),
        "bending damping beta of (14)", presence);
@@ -132,17 +132,23 @@ static void describe(Keys& key, EstimationSettings& it) {
       "pose: position and orientation; orientation: inertial sensors; paper_eq20: the paper's "
       "(20), "
       "for comparison only");
-  KEY(position_noise_m, above(0, 1), "standard deviation an axis of every measured body");
-  KEY(orientation_noise_rad, above(0, 1), "the same, of its rotation vector");
+  KEY(position_noise_m, above(0, 0.02), "standard deviation an axis of every measured body");
+  KEY(orientation_noise_rad, above(0, 0.2), "the same, of its rotation vector");
   KEY(filter_bandwidth_radps, above(0, 1e5), "of the velocity filter on u");
   KEY(predicted_frames, from(0, 1000), "frames an occluded segment may be predicted for");
   KEY(observer, one_of({"kinematic", "model"}),
       "of u and u': kinematic (a filter on u alone) or model (a Kalman filter on (16), with a "
       "disturbance and parameters)");
   KEY(model_observer, "of observer: model");
-  KEY(quaternion_tolerance, above(0, 1), "a frame with ||q| - 1| above it is rejected");
-  KEY(length_tolerance, above(0, 100), "a frame with ||t| - chord| / L above it is rejected");
-  KEY(max_speed_radps, above(0, kMany), "a frame in which u jumps faster is rejected");
+  KEY(quaternion_tolerance, above(0, 0.1), "a frame with ||q| - 1| above it is rejected");
+  KEY(length_tolerance, above(0, 1), "a frame with ||t| - chord| / L above it is rejected");
+  KEY(torsion_tolerance_rad, above(0, 1.2),
+      "a frame in which a segment is turned further about its own axis is rejected: a body "
+      "recognised turned");
+  KEY(max_speed_radps, above(0, 200), "a frame in which u jumps faster is rejected");
+  KEY(stale_frames, from(0, 100),
+      "a body that repeats its pose in so many frames while others move counts as not seen; 0: not "
+      "checked");
 }
 
 static void describe(Keys& key, ControlTerms& it) {
@@ -176,11 +182,11 @@ static void describe(Keys& key, ControllerSettings& it) {
   KEY(disturbance, one_of({"cancel", "model_only", "none"}),
       "what the model observer found: cancel (parameters and disturbance), model_only (parameters; "
       "the arm stays soft), none");
-  KEY(valve_lag_s, from(0, 5), "first-order lag inverted on what depends on the reference alone");
-  key("delay_s", it.dead_time_s, from(0, 5),
+  KEY(valve_lag_s, from(0, 0.5), "first-order lag inverted on what depends on the reference alone");
+  key("delay_s", it.dead_time_s, from(0, 0.5),
       "dead time of valves and tubes, for the check of gains at load time");
   KEY(max_theta_rad, above(0, kTwoPi), "soft limit on theta of reference and arm");
-  KEY(max_speed_radps, above(0, 1e4), "soft limit on |u'| of reference and arm, a segment");
+  KEY(max_speed_radps, above(0, 100), "soft limit on |u'| of reference and arm, a segment");
   KEY(max_step_rad, above(0, kTwoPi), "a larger jump of a live reference is refused");
   KEY(blend_s, above(0, 1e3), "time in which a reference is joined from wherever the arm is");
   KEY(polar_theta_min_rad, above(0, 1), "bounds A^-1 and the phi error near theta = 0, if polar");
@@ -199,7 +205,7 @@ static void describe_identification(Keys& key, IdentificationSettings& it, Motio
   KEY(hold_s, from(0.1, 100), "from step to step");
   key("max_theta_rad", limits.max_theta_rad, above(0, kTwoPi),
       "a segment that bends farther ends the experiment");
-  key("max_speed_radps", limits.max_speed_radps, above(0, 1e4),
+  key("max_speed_radps", limits.max_speed_radps, above(0, 100),
       "a segment that moves faster ends the experiment");
   KEY(rest_u_rad, from(-kTwoPi, kTwoPi).one_or_pairs(),
       "where the springs rest, to predict a recorded motion; the controller does not know it");

@@ -25,42 +25,46 @@ void describe_reference(Keys& key, ReferenceSettings& it) {
 
 static void describe(Keys& key, SafetySettings& it) {
   KEY(arming, one_of({"automatic", "explicit"}),
-      "automatic: ACTIVE on good frames; explicit: on an operator's arm");
-  KEY(frame_period_s, above(0, 10), "nominal, of the motion capture");
-  KEY(frame_latency_s, from(0, 10), "declared, from capture to arrival");
-  KEY(hold_after_s, from(0, 100),
+      "automatic: ACTIVE on good frames; explicit: on an operator's arm, the default where valves "
+      "is not a terminal on this machine");
+  KEY(frame_period_s, above(0, 0.2),
+      "nominal, of the motion capture; where frames come three times as fast the arm stays vented");
+  KEY(frame_latency_s, from(0, 0.5), "declared, from capture to arrival");
+  KEY(hold_after_s, from(0, 1),
       "age of the last frame: HOLD; 0: max(3 T, 3 frame_period_s + frame_latency_s), T = "
       "1/rate_hz");
-  KEY(vent_after_s, from(0, 100),
+  KEY(vent_after_s, from(0, 2),
       "the same: VENT; 0: max(0.1 s, 10 frame_period_s, 3 T); above hold_after_s");
-  KEY(good_frames, from(1, 100000), "in a row, before HOLD or VENT is left");
-  KEY(max_latency_s, above(0, 10), "later frames count as stale");
-  KEY(frozen_frames, from(0, 1000000),
+  KEY(good_frames, from(1, 10000), "in a row, before HOLD or VENT is left");
+  KEY(most_activations, from(1, 20),
+      "from vented, in a minute and without an operator's arm; then it stays vented until armed");
+  KEY(max_latency_s, above(0, 0.5), "later frames count as stale");
+  KEY(frozen_frames, from(0, 1000),
       "identical poses in a row while the command changes: HOLD; 0: not checked");
-  KEY(hold_overruns, from(1, 1000000), "ticks missed in a row: HOLD; only with SCHED_FIFO");
-  KEY(vent_overruns, from(1, 1000000), "the same: VENT; above hold_overruns");
+  KEY(hold_overruns, from(1, 20000), "ticks missed in a row: HOLD; only with SCHED_FIFO");
+  KEY(vent_overruns, from(1, 20000), "the same: VENT; above hold_overruns, at most 1 s of ticks");
   KEY(valve_readback, "valves publish measured pressures");
-  KEY(valve_silence_s, above(0, 10), "without any measured pressure: FAULT");
+  KEY(valve_silence_s, above(0, 2), "without any measured pressure: FAULT");
   KEY(pressure_tolerance_bar, from(0, 100),
       "measured pressures further outside the range lately commanded: FAULT (burst, leak); 0: not "
       "checked");
-  KEY(pressure_settling_s, above(0, 10),
+  KEY(pressure_settling_s, above(0, 2),
       "how far back that range goes, to twice that: longer than valves and tubes take");
   KEY(curvature_residual_nm, from(0, 1e4),
       "|K u + G - A tau_A| of a segment above it: FAULT; 0: not checked");
-  KEY(curvature_settling_s, above(0, 100), "for so long without interruption");
-  KEY(oscillation_rad, from(0, kTwoPi),
+  KEY(curvature_settling_s, above(0, 5), "for so long without interruption");
+  KEY(oscillation_rad, from(0, 1),
       "amplitude of a coordinate's error that oscillates and does not fade: VENT; 0: not checked");
-  KEY(oscillation_periods, from(1, 100), "for so many periods");
+  KEY(oscillation_periods, from(1, 20), "for so many periods");
   KEY(oscillation_lowest_hz, above(0, 1e3), "slower ones do not count");
   KEY(oscillation_part, from(0, 100),
       "of what the reference itself does meanwhile: a smaller error follows the reference");
-  KEY(length_warning, from(0, 100),
+  KEY(length_warning, from(0, 1),
       "a segment's measured length off arm.length_m by more, over that: the status reports it; 0: "
       "not checked");
-  KEY(length_fault, from(0, 100), "the same: FAULT; 0: not checked");
-  KEY(length_settling_s, above(0, 100), "for so long without interruption");
-  KEY(deadman_timeout_s, above(0, 10), "without a go on lcm.deadman_channel: VENT");
+  KEY(length_fault, from(0, 1), "the same: FAULT; 0: not checked");
+  KEY(length_settling_s, above(0, 5), "for so long without interruption");
+  KEY(deadman_timeout_s, above(0, 2), "without a go on lcm.deadman_channel: VENT");
 }
 
 static void describe_mocap(Keys& key, TransportSettings& transport) {
@@ -144,7 +148,7 @@ static void describe_lcm(Keys& key, LcmSettings& it, SafetySettings& safety) {
   KEY(url, from(1, 200), "LCM provider; the time to live keeps messages on this machine");
   for (const auto& [name, channel, fewest, doc] : kChannelKeys)
     key(name, it.*channel, from(fewest, 63), doc);
-  key("command_validity_s", safety.command_validity_s, above(0, 10),
+  key("command_validity_s", safety.command_validity_s, above(0, 0.5),
       "after which the valve side vents by itself");
 }
 

@@ -51,7 +51,7 @@ void describe(Keys& key, ValveDriverSettings& it) {
   KEY(failsafe_timeout_s, above(0, 1), "silence of ours after which the terminal itself vents");
   KEY(vented_bar, above(0, 1), "measured pressures up to this count as vented");
   KEY(stuck_bar, above(0, 100), "a pressure further from its set point than this ...");
-  KEY(stuck_after_s, above(0, 100), "... for so long belongs to a stuck valve");
+  KEY(stuck_after_s, above(0, 5), "... for so long belongs to a stuck valve");
   KEY(stuck_vents, "a stuck valve vents the arm; false: it is only reported");
 }
 

@@ -6,6 +6,7 @@
 
 #include "config/checks.hpp"
 #include "config/describe.hpp"
+#include "config/plausibility.hpp"
 #include "config/printers.hpp"
 #include "softarm/base/hash.hpp"
 #include "softarm/valves/register_map.hpp"
@@ -53,6 +54,9 @@ Experiment read(const std::filesystem::path& file) {
   keys.visit([&] { describe(keys, experiment); });
   experiment.estimation.base_is_fixed = experiment.transport.bodies.base_id < 0;
   experiment.safety.deadman = !experiment.transport.lcm.deadman_channel.empty();
+  // Nobody is to be surprised by an arm that moves: where valves may be real, an operator arms.
+  if (!keys.given("daemon.safety.arming") && drives_real_valves(experiment))
+    experiment.safety.arming = Arming::explicit_;
   check_consistency(experiment, keys);
   experiment.files = keys.files();
   experiment.hash = fnv1a(resolved_text(experiment));

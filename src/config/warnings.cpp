@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "config/plausibility.hpp"
 #include "softarm/actuation/pressure_allocator.hpp"
 #include "softarm/base/time.hpp"
 #include "softarm/config/load.hpp"
@@ -101,20 +102,6 @@ std::vector<std::string> experiment_warnings(const Experiment& experiment) {
     }
   }
 
-  double length_m = 0.0;
-  for (const SegmentParameters& segment : experiment.arm.segments) length_m += segment.length_m;
-  for (std::size_t i = 0; i < experiment.reference.phases.size(); ++i) {
-    const auto* path = experiment.reference.phases[i].kind.get_if<TipPathReference>();
-    if (path == nullptr) continue;
-    const double away_m = path->largest_distance_m(experiment.arm.base_position_m);
-    if (away_m > length_m) {
-      warnings.push_back(fmt::format(
-          "reference[{}]: the path goes {:.4g} m away from the base, the arm is {:.4g} m "
-          "long: the tip will stay behind",
-          i, away_m, length_m));
-    }
-  }
-
   const SafetyThresholds thresholds =
       resolve_thresholds(experiment.safety, 1.0 / experiment.rate_hz);
   const double unanswered_s =
@@ -135,6 +122,7 @@ std::vector<std::string> experiment_warnings(const Experiment& experiment) {
         "simulated arm will never stay ACTIVE",
         oldest_s, hold_s));
   }
+  for (std::string& each : plausibility_warnings(experiment)) warnings.push_back(std::move(each));
   return warnings;
 }
 

@@ -68,7 +68,7 @@ void PaperReference::describe(Keys& key) {
   key("rise_s", rise_s, above(0, 1e3), "time of the rise from theta = 0");
   key("phi_centre_rad", phi_centre_rad, from(-2 * pi, 2 * pi),
       "phi_i = centre + amplitude cos(rate t + (i - 1) step)");
-  key("phi_amplitude_rad", phi_amplitude_rad, from(0, 100), "amplitude of phi");
+  key("phi_amplitude_rad", phi_amplitude_rad, from(0, 2.0 * std::numbers::pi), "amplitude of phi");
   key("rate_radps", rate_radps, from(0, 1e3), "rate of phi");
   key("phase_step_rad", phase_step_rad, from(-2 * pi, 2 * pi), "phase from segment to segment");
 }

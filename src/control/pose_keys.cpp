@@ -24,7 +24,7 @@ void describe_pose(Keys& key, std::vector<double>& u_rad, Presence presence) {
     }
     key("theta_rad", theta, from(-kTwoPi, kTwoPi).one_or_each(),
         "bend of all segments, or a list (or u_rad: [[x, y], ...])", presence);
-    key("phi_rad", phi, from(-100, 100).one_or_each(),
+    key("phi_rad", phi, from(-kTwoPi, kTwoPi).one_or_each(),
         "direction of the bend of all segments, or a list");
     for (std::size_t i = 0; i < n && key.reading(); ++i) {
       // Adding zero makes a negative zero positive, so that what is printed reads back the same.

@@ -11,6 +11,9 @@
 namespace softarm {
 namespace {
 
+/// Of the segment's length; a shorter chord has no direction worth judging.
+constexpr double kLeastChord = 0.2;
+
 /// 2 atan2(h, v) / h for h >= 0, the factor that turns (v1, v2) into u. For v > 0 it is an even
 /// entire-like function of h with the limit 2 / v; the series serves where h / v could underflow or
 /// h is zero.
@@ -31,7 +34,7 @@ struct RelativePose {
   Eigen::Vector3d t;
   double chord;
   Eigen::Vector3d bend;  // (q_y, -q_x, q_w), not normalized, on the side of t
-  double twist_sine;     // q_z on the same side
+  Eigen::Vector3d axis;  // vector part of q on the same side
 };
 
 RelativePose relative_pose(const BodyPose& upper, const BodyPose& lower) {
@@ -45,7 +48,7 @@ RelativePose relative_pose(const BodyPose& upper, const BodyPose& lower) {
   const double side = out.chord > 0.0 ? out.bend.dot(out.t) : out.q.w();
   const double sign = side < 0.0 ? -1.0 : 1.0;
   out.bend *= sign;
-  out.twist_sine = sign * out.q.z();
+  out.axis = sign * out.q.vec();
   return out;
 }
 
@@ -54,6 +57,13 @@ struct Weights {
   double orientation;  // of the unit bend vector
   double variance;     // of theta
 };
+
+/// A PCC segment with the chord direction d = t/|t| has the quaternion q0 = (d_z; -d_y, d_x, 0). The
+/// angle about d of what is left of q beyond it, q0^-1 q: 2 atan2(d . q_vector, d . bend), which is
+/// alpha where a PCC segment's end is turned about its own axis by alpha.
+double torsion_about_chord(const RelativePose& relative) {
+  return 2.0 * std::atan2(relative.t.dot(relative.axis), relative.t.dot(relative.bend));
+}
 
 /// The best linear combination of the two measurements of theta / 2, see the header; multiplied by
 /// |t|^2 so that nothing is divided by a chord that vanishes towards theta = 2 pi.
@@ -140,6 +150,15 @@ std::vector<BodyNoise> body_noise(const EstimationSettings& settings, int segmen
   return noise;
 }
 
+void CurvatureEstimate::leave_out(int index) noexcept {
+  const auto k = static_cast<std::size_t>(index);
+  valid[k] = false;
+  u_rad.segment<2>(2 * index).setZero();
+  variance_rad2[k] = twist_rad[k] = torsion_rad[k] = length_error_m[k] = 0.0;
+  length_m[k] = length_covariance_m_rad[k] = 0.0;
+  length_variance_m2[k] = std::numeric_limits<double>::infinity();
+}
+
 CurvatureEstimator::CurvatureEstimator(const EstimationSettings& settings, const ArmParameters& arm,
                                        std::span<const BodyNoise> noise)
     : method_(settings.method) {
@@ -198,7 +217,11 @@ SegmentCurvature CurvatureEstimator::segment(int index, const BodyPose& upper,
   }
   if (!out.valid) out.u_rad.setZero();
   if (out.valid) measure_length(constants.position_variance, out);
-  out.twist_rad = 2.0 * std::atan2(relative.twist_sine, bend_norm);
+  out.twist_rad = 2.0 * std::atan2(relative.axis.z(), bend_norm);
+  // Towards theta = 2 pi the chord vanishes, and with it its direction.
+  out.torsion_rad = relative.chord > kLeastChord * constants.length_m
+                        ? torsion_about_chord(relative)
+                        : out.twist_rad;
   return out;
 }
 
@@ -216,6 +239,7 @@ void CurvatureEstimator::estimate(const MocapFrame& frame, CurvatureEstimate& ou
     out.u_rad.segment<2>(2 * i) = one.u_rad;
     out.variance_rad2[k] = one.valid ? one.variance_rad2 : 0.0;
     out.twist_rad[k] = one.valid ? one.twist_rad : 0.0;
+    out.torsion_rad[k] = one.valid ? one.torsion_rad : 0.0;
     out.length_error_m[k] =
         one.valid ? one.chord_m - segments_[k].length_m * one.chord_over_length : 0.0;
     out.length_m[k] = one.length_m;

@@ -28,8 +28,8 @@ constexpr std::int64_t FrameCounters::*kCounters[] = {
     &FrameCounters::accepted,       &FrameCounters::repeated,   &FrameCounters::out_of_order,
     &FrameCounters::restarted,      &FrameCounters::wrong_size, &FrameCounters::not_finite,
     &FrameCounters::bad_quaternion, &FrameCounters::bad_length, &FrameCounters::jump,
-    &FrameCounters::not_seen};
-static_assert(std::size(kCounters) == static_cast<std::size_t>(FrameVerdict::not_seen) + 1);
+    &FrameCounters::not_seen,       &FrameCounters::bad_torsion};
+static_assert(std::size(kCounters) == kFrameVerdicts);
 
 bool finite(const BodyPose& body) {
   return body.position_m.allFinite() && body.orientation.coeffs().allFinite();
@@ -49,11 +49,27 @@ void require_positive(double value, const char* name) {
 
 }  // namespace
 
+const char* name(FrameVerdict verdict) noexcept {
+  constexpr const char* kNames[] = {"accepted",         "repeated",   "out_of_order",
+                                    "sender_restarted", "wrong_size", "not_finite",
+                                    "bad_quaternion",   "bad_length", "jump",
+                                    "not_seen",         "bad_torsion"};
+  static_assert(std::size(kNames) == kFrameVerdicts);
+  const auto index = static_cast<std::size_t>(verdict);
+  return index < std::size(kNames) ? kNames[index] : "unknown";
+}
+
+std::int64_t FrameCounters::of(FrameVerdict verdict) const noexcept {
+  const auto index = static_cast<std::size_t>(verdict);
+  return index < std::size(kCounters) ? this->*kCounters[index] : 0;
+}
+
 FrameValidator::FrameValidator(const EstimationSettings& settings, const ArmParameters& arm,
                                std::span<const BodyNoise> noise)
-    : settings_(settings), estimator_(settings, arm, noise) {
+    : settings_(settings), estimator_(settings, arm, noise), stale_(settings, arm.size()) {
   require_positive(settings.quaternion_tolerance, "quaternion_tolerance");
   require_positive(settings.length_tolerance, "length_tolerance");
+  require_positive(settings.torsion_tolerance_rad, "torsion_tolerance_rad");
   require_positive(settings.max_speed_radps, "max_speed_radps");
   for (const SegmentParameters& segment : arm.segments) length_m_.push_back(segment.length_m);
   reset();
@@ -65,10 +81,12 @@ void FrameValidator::reset() noexcept {
   old_in_row_ = 0;
   identical_in_row_ = 0;
   seen_.fill(false);
+  stale_.reset();
 }
 
-FrameVerdict FrameValidator::accept(const MocapFrame& frame) noexcept {
-  const FrameVerdict verdict = judge(frame);
+FrameVerdict FrameValidator::accept(const MocapFrame& frame,
+                                    const CommandedMotion& commanded) noexcept {
+  const FrameVerdict verdict = judge(frame, commanded);
   ++(counters_.*kCounters[static_cast<std::size_t>(verdict)]);
   if (verdict == FrameVerdict::accepted) remember(frame);
   if (verdict == FrameVerdict::sender_restarted) {
@@ -79,14 +97,17 @@ FrameVerdict FrameValidator::accept(const MocapFrame& frame) noexcept {
   return verdict;
 }
 
-FrameVerdict FrameValidator::judge(const MocapFrame& frame) noexcept {
+FrameVerdict FrameValidator::judge(const MocapFrame& frame,
+                                   const CommandedMotion& commanded) noexcept {
   if (frame.segments != estimator_.segments()) return FrameVerdict::wrong_size;
   FrameVerdict verdict = judge_number(frame.frame_number);
   if (verdict != FrameVerdict::accepted) return verdict;
   if (has_frame_ && frame.capture_ns <= last_.capture_ns) return FrameVerdict::out_of_order;
   verdict = judge_poses(frame);
   if (verdict != FrameVerdict::accepted) return verdict;
-  return judge_segments(frame);
+  verdict = judge_segments(frame);
+  if (verdict != FrameVerdict::accepted) return verdict;
+  return leave_out_stale_bodies(frame, commanded);
 }
 
 FrameVerdict FrameValidator::judge_number(std::int64_t number) noexcept {
@@ -136,10 +157,12 @@ FrameVerdict FrameValidator::judge_segments(const MocapFrame& frame) noexcept {
     // Inertial sensors leave the positions at zero.
     const bool has_chord = settings_.method != CurvatureMethod::orientation || chord > 0.0;
     const double slack = settings_.length_tolerance * length_m_[i];
-    if (has_chord &&
-        !(chord <= length_m_[i] + slack && std::abs(candidate_.length_error_m[i]) <= slack)) {
+    if (has_chord && !(chord <= length_m_[i] + slack)) return FrameVerdict::bad_length;
+    // Before the length by the bend, which a turned body bends too.
+    if (!(std::abs(candidate_.torsion_rad[i]) <= settings_.torsion_tolerance_rad))
+      return FrameVerdict::bad_torsion;
+    if (has_chord && !(std::abs(candidate_.length_error_m[i]) <= slack))
       return FrameVerdict::bad_length;
-    }
     if (!seen_[i]) continue;
     const double passed_s = to_seconds(frame.capture_ns - seen_ns_[i]);
     const double noise = std::sqrt(candidate_.variance_rad2[i] + seen_variance_rad2_[i]);
@@ -151,6 +174,20 @@ FrameVerdict FrameValidator::judge_segments(const MocapFrame& frame) noexcept {
   return jumped ? FrameVerdict::jump : FrameVerdict::accepted;
 }
 
+/// Of a frame that is right otherwise: one that is refused is no evidence of what moves.
+FrameVerdict FrameValidator::leave_out_stale_bodies(const MocapFrame& frame,
+                                                    const CommandedMotion& commanded) noexcept {
+  stale_.observe(frame, commanded);
+  bool any = false, some_stale = false;
+  for (std::size_t i = 0; i < length_m_.size(); ++i) {
+    some_stale = some_stale || stale_.stale(i + 1);
+    if (stale_.stale(i) || stale_.stale(i + 1)) candidate_.leave_out(static_cast<int>(i));
+    any = any || candidate_.valid[i];
+  }
+  if (some_stale) ++counters_.stale;
+  return any ? FrameVerdict::accepted : FrameVerdict::not_seen;
+}
+
 void FrameValidator::remember(const MocapFrame& frame) noexcept {
   bool same = has_frame_;
   for (std::size_t i = 0; same && i <= length_m_.size(); ++i) {
@@ -158,6 +195,8 @@ void FrameValidator::remember(const MocapFrame& frame) noexcept {
   }
   identical_in_row_ = same ? identical_in_row_ + 1 : 0;
   last_ = frame;
+  for (std::size_t i = 1; i <= length_m_.size(); ++i)
+    last_.body[i].valid = frame.body[i].valid && !stale_.stale(i);
   has_frame_ = true;
   estimate_ = candidate_;
   for (std::size_t i = 0; i < length_m_.size(); ++i) {

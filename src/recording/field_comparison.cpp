@@ -135,11 +135,11 @@ std::vector<FieldDifference> differences(const torque_command_t& recorded,
 std::vector<FieldDifference> differences(const controller_status_t& recorded,
                                          const controller_status_t& replayed) {
   const auto& [time_a, tick_a, frame_a, hash_a, seed_a, nonce_a, version_a, mode_a, reason_a,
-               flags_a, age_a, accepted_a, rejected_a, repeated_a, missing_a, overruns_a,
+               flags_a, age_a, accepted_a, rejected_a, refusal_a, repeated_a, missing_a, overruns_a,
                malformed_a, segments_a, chambers_a, u_a, velocity_a, reference_a, phi_a, theta_a,
                tau_a, twist_a, length_a, pressure_a] = recorded;
   const auto& [time_b, tick_b, frame_b, hash_b, seed_b, nonce_b, version_b, mode_b, reason_b,
-               flags_b, age_b, accepted_b, rejected_b, repeated_b, missing_b, overruns_b,
+               flags_b, age_b, accepted_b, rejected_b, refusal_b, repeated_b, missing_b, overruns_b,
                malformed_b, segments_b, chambers_b, u_b, velocity_b, reference_b, phi_b, theta_b,
                tau_b, twist_b, length_b, pressure_b] = replayed;
   Collector compare;
@@ -151,6 +151,7 @@ std::vector<FieldDifference> differences(const controller_status_t& recorded,
   compare("frame_age_s", "s", age_a, age_b);
   compare("frames_accepted", "", accepted_a, accepted_b);
   compare("frames_rejected", "", rejected_a, rejected_b);
+  compare("refusal", "", int{refusal_a}, int{refusal_b});
   compare("frames_repeated", "", repeated_a, repeated_b);
   compare("frames_missing", "", missing_a, missing_b);
   compare("num_segments", "", segments_a, segments_b);

@@ -37,11 +37,15 @@ ControlPipeline::ControlPipeline(const PipelineSettings& settings)
       observer_(make_observer(settings)),
       delay_ns_(observer_ ? to_ns(settings.control.dead_time_s) : 0),
       safety_(settings.safety, period_s_),
+      activation_limit_(settings.safety),
+      answer_ns_(safety_.thresholds().hold_after_ns + to_ns(settings.control.dead_time_s)),
       reference_(settings.reference, settings.control, settings.arm),
       controller_(settings.arm, settings.control),
       allocator_(settings.actuation),
       ramps_(settings.actuation),
       pressure_watch_(settings.safety, allocator_.chambers()),
+      command_moves_(settings.actuation),
+      frame_period_watch_(settings.safety),
       curvature_watch_(settings.safety, settings.arm),
       oscillation_watch_(settings.safety, period_s_, settings.arm.dof()),
       length_watch_(settings.safety, settings.arm),
@@ -70,7 +74,9 @@ const TickOutput& ControlPipeline::tick(const TickInput& input) noexcept {
   watch(input, safety);
 
   const Mode before = safety_.mode();
+  safety.activated_too_often = activation_limit_.reached(input.now_ns, safety_);
   const Mode mode = safety_.step(safety);
+  activation_limit_.note(input.now_ns, before, input.requests.arm, safety_);
   if (mode == Mode::active && before != Mode::active) {
     // Frozen or vented for so many good frames the arm is at rest; its measured velocity would only
     // be noise.
@@ -93,6 +99,11 @@ const TickOutput& ControlPipeline::tick(const TickInput& input) noexcept {
     observer_->command(input.now_ns, commanded_tau_nm_);
   }
   pressure_watch_.command(input.now_ns, output_.pressure_bar);
+  command_moves_.command(input.now_ns, output_.pressure_bar);
+  if (unanswered_since_ns_ == kForever &&
+      (previous_bar_ - pressure_at_last_motion_bar_).cwiseAbs().maxCoeff() >
+          kFrozenCommandChange_bar)
+    unanswered_since_ns_ = input.now_ns;
 
   output_.mode = mode;
   output_.reason = safety_.reason();
@@ -121,8 +132,10 @@ void ControlPipeline::validate_and_estimate(const TickInput& input, SafetyInput&
     if (observer_) observer_->reset();
     pressure_watch_.reset();
     curvature_watch_.reset();
+    frame_period_watch_.restart();
     length_watch_.reset();
   }
+  const CommandedMotion commanded{command_moves_.began_ns(), settings_.safety.frozen_frames};
   const std::int64_t max_latency_ns = to_ns(settings_.safety.max_latency_s);
   for (const MocapFrame& frame : input.frames) {
     if (gap) break;
@@ -133,23 +146,26 @@ void ControlPipeline::validate_and_estimate(const TickInput& input, SafetyInput&
       ++safety.bad_frames;
       continue;
     }
-    const FrameVerdict verdict = validator_.accept(frame);
+    const FrameVerdict verdict = validator_.accept(frame, commanded);
     safety.sender_restarted |= verdict == FrameVerdict::sender_restarted;
     if (verdict == FrameVerdict::repeated) continue;
+    output_.refusal = verdict;
     if (verdict != FrameVerdict::accepted) {
       ++safety.bad_frames;
       continue;
     }
-    use_frame(frame);
+    use_frame();
     const auto& seen = validator_.estimate().valid;
     const bool complete = std::all_of(seen.begin(), seen.begin() + settings_.arm.size(),
                                       [](bool each) { return each; });
     ++(complete ? safety.good_frames : safety.bad_frames);
   }
   safety.now_ns = input.now_ns;
+  safety.frames_refused = output_.refusal != FrameVerdict::accepted;
+  safety.frame_period_mismatch = frame_period_watch_.mismatch();
   safety.newest_capture_ns =
       *std::min_element(seen_ns_.begin(), seen_ns_.begin() + settings_.arm.size());
-  safety.poses_frozen = poses_frozen();
+  safety.poses_frozen = poses_frozen(input.now_ns);
   // In HOLD only while the arm is seen, as what is predicted longer than that is no evidence, and
   // by its bend alone: where it is seen again after a while, the filter takes the way for speed.
   const bool held_and_seen =
@@ -191,12 +207,18 @@ void ControlPipeline::watch(const TickInput& input, SafetyInput& safety) noexcep
   safety.curvature_mismatch = curvature_watch_.out_of_tolerance();
 }
 
-void ControlPipeline::use_frame(const MocapFrame& frame) noexcept {
+/// Of the newest accepted frame.
+void ControlPipeline::use_frame() noexcept {
+  const MocapFrame& frame = validator_.newest();
   const CurvatureEstimate& estimate = validator_.estimate();
   for (int i = 0; i < settings_.arm.size(); ++i)
     if (estimate.valid[static_cast<std::size_t>(i)])
       seen_ns_[static_cast<std::size_t>(i)] = frame.capture_ns;
-  if (validator_.identical_in_row() == 0) pressure_at_last_motion_bar_ = previous_bar_;
+  frame_period_watch_.frame(frame.capture_ns);
+  if (validator_.identical_in_row() == 0) {
+    pressure_at_last_motion_bar_ = previous_bar_;
+    unanswered_since_ns_ = kForever;
+  }
   newest_capture_ns_ = frame.capture_ns;
   length_watch_.judge(frame.capture_ns, estimate);
   output_.frame_number = frame.frame_number;
@@ -279,11 +301,10 @@ void ControlPipeline::limit(Mode mode) noexcept {
   previous_bar_ = output_.pressure_bar;
 }
 
-bool ControlPipeline::poses_frozen() const noexcept {
+bool ControlPipeline::poses_frozen(std::int64_t now_ns) const noexcept {
   const int frozen = settings_.safety.frozen_frames;
   return frozen > 0 && validator_.identical_in_row() >= frozen &&
-         (previous_bar_ - pressure_at_last_motion_bar_).cwiseAbs().maxCoeff() >
-             kFrozenCommandChange_bar;
+         unanswered_since_ns_ != kForever && now_ns - unanswered_since_ns_ >= answer_ns_;
 }
 
 bool ControlPipeline::beyond_soft_limit(bool speed_too) const noexcept {

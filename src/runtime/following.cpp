@@ -10,15 +10,38 @@
 #include "softarm/runtime/settings.hpp"
 
 namespace softarm {
+namespace {
+
+/// A movement of the commanded pressures that must show in the poses.
+constexpr double kNoticeable_bar = 0.03;
+
+/// Least frames and declared periods of an interval, and how much faster than declared is too fast.
+constexpr int kFrames = 40;
+constexpr int kPeriods = 20;
+constexpr int kFaster = 3;
+
+}  // namespace
 
 PressureWatch::PressureWatch(const SafetySettings& settings, int chambers) noexcept
     : tolerance_bar_(settings.pressure_tolerance_bar),
       settling_ns_(to_ns(settings.pressure_settling_s)) {
-  for (PressureVector* bound : {&now_.low, &now_.high, &before_.low, &before_.high})
+  for (PressureVector* bound :
+       {&now_.low, &now_.high, &before_.low, &before_.high, &since_change_.low, &since_change_.high,
+        &commanded_bar_, &measured_bar_})
     bound->setZero(chambers);
+  moved_ns_.assign(static_cast<std::size_t>(chambers), kNever);
 }
 
 void PressureWatch::command(std::int64_t now_ns, const PressureVector& commanded_bar) noexcept {
+  now_ns_ = now_ns;
+  commanded_bar_ = commanded_bar;
+  since_change_.low = since_change_.low.cwiseMin(commanded_bar);
+  since_change_.high = since_change_.high.cwiseMax(commanded_bar);
+  for (Eigen::Index j = 0; j < commanded_bar.size(); ++j) {
+    std::int64_t& moved_ns = moved_ns_[static_cast<std::size_t>(j)];
+    const bool wide = since_change_.high[j] - since_change_.low[j] > 0.5 * tolerance_bar_;
+    if (wide && moved_ns == kNever) moved_ns = now_ns;
+  }
   if (known_ == 0 || now_ns - since_ns_ >= settling_ns_) {
     before_ = now_;
     known_ = std::min(known_ + 1, 2);
@@ -31,7 +54,9 @@ void PressureWatch::command(std::int64_t now_ns, const PressureVector& commanded
 }
 
 void PressureWatch::measure(const PressureVector& measured_bar) noexcept {
-  if (tolerance_bar_ <= 0.0 || known_ < 2) return;
+  if (tolerance_bar_ <= 0.0) return;
+  judge_repeats(measured_bar);
+  if (known_ < 2) return;
   bool outside = false;
   for (Eigen::Index j = 0; j < measured_bar.size(); ++j) {
     const double low = std::min(now_.low[j], before_.low[j]) - tolerance_bar_;
@@ -41,7 +66,64 @@ void PressureWatch::measure(const PressureVector& measured_bar) noexcept {
   in_row_ = outside ? std::min(in_row_ + 1, kInRow) : 0;
 }
 
-void PressureWatch::reset() noexcept { known_ = in_row_ = 0; }
+void PressureWatch::judge_repeats(const PressureVector& measured_bar) noexcept {
+  stale_ = false;
+  for (Eigen::Index j = 0; j < measured_bar.size(); ++j) {
+    std::int64_t& moved_ns = moved_ns_[static_cast<std::size_t>(j)];
+    if (measured_ && measured_bar[j] == measured_bar_[j]) {
+      stale_ |= moved_ns != kNever && now_ns_ - moved_ns >= settling_ns_;
+      continue;
+    }
+    since_change_.low[j] = since_change_.high[j] = commanded_bar_[j];
+    moved_ns = kNever;
+  }
+  measured_bar_ = measured_bar;
+  measured_ = true;
+}
+
+void PressureWatch::reset() noexcept {
+  known_ = in_row_ = 0;
+  measured_ = stale_ = false;
+}
+
+CommandMoves::CommandMoves(const ActuationSettings& actuation)
+    : anchor_bar_(PressureVector::Zero(chamber_count(actuation))),
+      anchored_ns_(actuation.segments.size(), kNever),
+      began_ns_(actuation.segments.size(), kNever) {
+  for (const auto& segment : actuation.segments) chambers_.push_back(std::ssize(segment));
+}
+
+void CommandMoves::command(std::int64_t now_ns, const PressureVector& commanded_bar) noexcept {
+  Eigen::Index first = 0;
+  std::int64_t newest_ns = kNever;
+  for (std::size_t i = 0; i < chambers_.size(); ++i) {
+    const auto now = commanded_bar.segment(first, chambers_[i]);
+    auto anchor = anchor_bar_.segment(first, chambers_[i]);
+    if (anchored_ns_[i] == kNever) anchored_ns_[i] = now_ns;
+    if ((now - anchor).cwiseAbs().maxCoeff() > kNoticeable_bar) {
+      newest_ns = std::max(newest_ns, anchored_ns_[i]);
+      anchor = now;
+      anchored_ns_[i] = now_ns;
+    }
+    newest_ns = std::max(newest_ns, began_ns_[i]);
+    began_ns_[i] = newest_ns;
+    first += chambers_[i];
+  }
+}
+
+void FramePeriodWatch::frame(std::int64_t capture_ns) noexcept {
+  if (frames_ == 0) {
+    begin_ns_ = capture_ns;
+    longest_ns_ = 0;
+  } else {
+    longest_ns_ = std::max(longest_ns_, capture_ns - last_ns_);
+  }
+  last_ns_ = capture_ns;
+  ++frames_;
+  if (frames_ <= kFrames || capture_ns - begin_ns_ < kPeriods * declared_ns_) return;
+  mismatch_ = kFaster * longest_ns_ < declared_ns_;
+  frames_ = 0;
+}
 
 CurvatureWatch::CurvatureWatch(const SafetySettings& settings, const ArmParameters& arm)
     : limit_nm_(settings.curvature_residual_nm),

@@ -75,6 +75,8 @@ constexpr std::array kCauses{
           [](const Evidence& e) { return e.foreign_age_ns <= kForeign_ns; }},
     Cause{{Reason::soft_limit, Mode::vent, Clearance::arm},
           [](const Evidence& e) { return e.input.soft_limit_exceeded; }},
+    Cause{{Reason::activated_too_often, Mode::vent, Clearance::arm},
+          [](const Evidence& e) { return e.input.activated_too_often; }},
     Cause{{Reason::oscillation, Mode::vent, Clearance::arm},
           [](const Evidence& e) { return e.input.oscillation; }},
     Cause{{Reason::valves_silent, Mode::vent, Clearance::good_frames},
@@ -93,6 +95,8 @@ constexpr std::array kCauses{
           [](const Evidence& e) { return e.input.sender_restarted; }},
     Cause{{Reason::frames_stale, Mode::vent, Clearance::good_frames},
           [](const Evidence& e) { return e.frame_age_ns > e.thresholds.vent_after_ns; }},
+    Cause{{Reason::frame_period_mismatch, Mode::vent, Clearance::good_frames},
+          [](const Evidence& e) { return e.input.frame_period_mismatch; }},
     Cause{{Reason::many_overruns, Mode::vent, Clearance::good_frames},
           [](const Evidence& e) {
             return e.settings.vent_overruns > 0 &&
@@ -110,6 +114,18 @@ constexpr std::array kCauses{
                    e.input.consecutive_overruns >= e.settings.hold_overruns;
           }},
 };
+
+/// Frames that come and are refused are late for another reason than those that do not come.
+CauseRule named(CauseRule rule, const SafetyInput& input) noexcept {
+  const bool by_age = rule.reason == Reason::frames_late || rule.reason == Reason::frames_stale;
+  if (by_age && input.frames_refused) rule.reason = Reason::frames_refused;
+  return rule;
+}
+
+/// What a vented arm waits for where no cause demands more.
+Reason waiting_for_frames(const SafetyInput& input) {
+  return input.frames_refused ? Reason::frames_refused : Reason::waiting_for_frames;
+}
 
 constexpr auto kRules = [] {
   std::array<CauseRule, kCauses.size()> rules{};
@@ -155,7 +171,10 @@ const char* name(Reason reason) noexcept {
                               "oscillation",
                               "length_mismatch",
                               "foreign_commands",
-                              "requests_lost"};
+                              "requests_lost",
+                              "frames_refused",
+                              "frame_period_mismatch",
+                              "activated_too_often"};
   static_assert(kNames.size() == static_cast<std::size_t>(kReasons));
   return name_of(reason, kNames);
 }
@@ -215,7 +234,7 @@ CauseRule SafetyMonitor::worst_cause(const SafetyInput& input) const noexcept {
       .go_age_ns = age_ns(input.now_ns, input.newest_go_ns),
       .foreign_age_ns = age_ns(input.now_ns, input.newest_foreign_ns)};
   for (const Cause& cause : kCauses)
-    if (cause.present(evidence)) return cause.rule;
+    if (cause.present(evidence)) return named(cause.rule, input);
   return {Reason::none, Mode::active, Clearance::good_frames};
 }
 
@@ -291,8 +310,9 @@ Mode SafetyMonitor::step(const SafetyInput& input) noexcept {
       if (worst.demands == Mode::fault || worst.clearance == Clearance::never) {
         enter(worst);
       } else {
-        const bool by_frames = worst.demands < Mode::vent || worst.reason == Reason::frames_stale;
-        try_to_activate(input, by_frames ? Reason::waiting_for_frames : worst.reason);
+        const bool by_frames = worst.demands < Mode::vent || worst.reason == Reason::frames_stale ||
+                               worst.reason == Reason::frames_refused;
+        try_to_activate(input, by_frames ? waiting_for_frames(input) : worst.reason);
       }
       break;
     case Mode::active:
@@ -306,8 +326,11 @@ Mode SafetyMonitor::step(const SafetyInput& input) noexcept {
     case Mode::vent:
       if (worst.demands >= Mode::vent) {
         enter(worst);
-      } else if (worst.demands == Mode::active) {
+      } else if (reason_ != Reason::waiting_for_arm) {
         try_to_activate(input, reason_);
+      } else {  // it would have been armed, but now something else is missing again
+        try_to_activate(input,
+                        worst.demands > Mode::active ? worst.reason : waiting_for_frames(input));
       }
       break;
     case Mode::fault:

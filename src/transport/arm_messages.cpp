@@ -24,7 +24,12 @@ void copy(const std::vector<Number>& from, Vector& to) {
 
 }  // namespace
 
-std::string ArmStatus::text() const { return std::string(name(mode)) + " (" + name(reason) + ")"; }
+std::string ArmStatus::reason_text() const {
+  const bool refused = reason == Reason::frames_refused && refusal != FrameVerdict::accepted;
+  return name(reason) + (refused ? std::string(": ") + name(refusal) : "");
+}
+
+std::string ArmStatus::text() const { return std::string(name(mode)) + " (" + reason_text() + ")"; }
 
 bool decode(std::span<const std::byte> bytes, ArmStatus& out) {
   using Message = softarm_messages::controller_status_t;
@@ -51,6 +56,7 @@ bool decode(std::span<const std::byte> bytes, ArmStatus& out) {
   out.frame_age_s = static_cast<double>(message.frame_age_s);
   out.frames_accepted = message.frames_accepted;
   out.frames_rejected = message.frames_rejected;
+  out.refusal = static_cast<FrameVerdict>(message.refusal);
   out.frames_repeated = message.frames_repeated;
   out.frames_missing = message.frames_missing;
   out.overruns = message.overruns;

@@ -120,7 +120,10 @@ void DaemonLink::take_reference(const ReceivedMessage& packet) noexcept {
     return;
   }
   const bool forgotten = age_ns(now_ns_, newest_reference_ns_) > kNumberForgotten_ns;
-  if (reference_message_.sequence <= reference_sequence_ && !forgotten) return;
+  if (reference_message_.sequence <= reference_sequence_ && !forgotten) {
+    if (reference_message_.sequence < reference_sequence_) ++backward_references_;
+    return;
+  }
   reference_sequence_ = reference_message_.sequence;
   newest_reference_ns_ = now_ns_;
   const auto vector = [this](const std::vector<double>& from) {
@@ -186,6 +189,8 @@ void DaemonLink::take_measurement(const ReceivedMessage& packet) noexcept {
   if (messages_.pressure_command.shadow == 0) take_valves_report();
   if (!valve_readback_) return;
   newest_measurement_ns_ = arrival_ns(packet);
+  if (measurement_message_.time_us < measurement_time_us_) ++backward_measurements_;
+  measurement_time_us_ = measurement_message_.time_us;
   std::copy(measured.begin(), measured.end(), measured_bar_.begin());
   // Measured pressures respond to the daemon that commands the valves, not to a shadow.
   if (messages_.pressure_command.shadow == 0) input_.measured_bar = &measured_bar_;

@@ -103,7 +103,7 @@ bool decode(std::span<const std::byte> bytes,
   const std::int64_t version = length32_at(bytes, kHash + kBeforeVersion);
   if (!text_at(bytes, kHash + kBeforeVersion + 4, version)) return false;
   const std::size_t counts =
-      kHash + kBeforeVersion + 4 + static_cast<std::size_t>(version) + 4 + 4 + 6 * 4;
+      kHash + kBeforeVersion + 4 + static_cast<std::size_t>(version) + 4 + 4 + 6 * 4 + 1;
   const int segments = bounded(length16_at(bytes, counts), kMaxSegments);
   const int chambers = bounded(length16_at(bytes, counts + 2), kMaxChambers);
   if (segments < 0 || chambers < 0) return false;

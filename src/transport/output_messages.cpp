@@ -96,6 +96,7 @@ void OutputMessages::set_status(std::int64_t tick, const ControlPipeline& pipeli
   status.frame_age_s = static_cast<float>(output.frame_age_s);
   status.frames_accepted = counter(frames.accepted);
   status.frames_rejected = counter(frames.rejected() + pipeline.late_frames());
+  status.refusal = static_cast<std::int8_t>(output.refusal);
   status.frames_repeated = counter(frames.repeated);
   status.frames_missing = counter(frames.missing);
   put_pairs(output.motion.u_rad, status.u_rad);

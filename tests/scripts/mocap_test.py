@@ -46,7 +46,7 @@ class Mocap(unittest.TestCase):
         # A machine that is busy with other things must not look like a faulty terminal.
         config = every.parent / "patient.yaml"
         config.write_text(f"include: {every}\nname: patient\nvalves: {{tolerated_failures: 100, failsafe_timeout_s: 0.5}}\n"
-                          "daemon: {safety: {pressure_tolerance_bar: 0, valve_silence_s: 10}}\n", encoding="utf-8")
+                          "daemon: {safety: {pressure_tolerance_bar: 0, valve_silence_s: 2}}\n", encoding="utf-8")
         start(self, self.folder, PROGRAMS / "softarm-plant", "--modbus", port, self.config("paper_arm_modbus", valves))
         start(self, self.folder, PROGRAMS / "softarm-valves", config)
         self.closes(config, "optitrack")

@@ -34,6 +34,10 @@ std::string schema_text();
 /// if all is well.
 std::vector<std::string> experiment_warnings(const Experiment& experiment);
 
+/// What the thresholds come to, in words and seconds, one line each: when the daemon holds, vents and
+/// faults, and when the valves vent by themselves.
+std::vector<std::string> reaction_times(const Experiment& experiment);
+
 /// Sixteen hexadecimal digits, the form of Experiment::hash in logs and in the status message.
 std::string hash_text(std::uint64_t hash);
 

@@ -34,6 +34,9 @@ struct CurvatureEstimate {
   /// Rotation about the segment's own axis, from q_z, in [-pi, pi]; zero for a PCC segment. Blind
   /// at theta = pi.
   std::array<double, kMaxSegments> twist_rad{};
+  /// Rotation about the chord that a PCC segment with this chord does not have, in [-pi, pi]: the
+  /// same, but not blind at any theta with a chord. It is twist_rad where there is no chord.
+  std::array<double, kMaxSegments> torsion_rad{};
   /// The length by the chord, l = |t| / c1(theta^2 / 4), m; its variance, first order in the noise
   /// of both bodies, (sigma_t / c1)^2 + (l kappa)^2 var theta with l kappa = dl/dtheta; and its
   /// covariance with theta. |t| does not feel the bodies' orientation. 0 and infinite where the
@@ -46,6 +49,9 @@ struct CurvatureEstimate {
   /// False: one of the segment's bodies was not seen, or its pose fits no bend; the segment's
   /// numbers are then zero.
   std::array<bool, kMaxSegments> valid{};
+
+  /// Makes segment `index` (0-based) one that was not observed.
+  void leave_out(int index) noexcept;
 };
 
 /// u of one segment from the pose of its upper and lower end.
@@ -53,6 +59,7 @@ struct SegmentCurvature {
   Eigen::Vector2d u_rad = Eigen::Vector2d::Zero();
   double variance_rad2 = 0.0;
   double twist_rad = 0.0;
+  double torsion_rad = 0.0;
   double chord_m = 0.0;            ///< |t|
   double chord_over_length = 0.0;  ///< c1(theta^2 / 4)
   double length_m = 0.0;

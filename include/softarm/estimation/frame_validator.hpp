@@ -7,6 +7,7 @@
 #include "softarm/estimation/curvature_estimator.hpp"
 #include "softarm/estimation/mocap_frame.hpp"
 #include "softarm/estimation/settings.hpp"
+#include "softarm/estimation/stale_bodies.hpp"
 
 namespace softarm {
 
@@ -22,8 +23,13 @@ enum class FrameVerdict {
   bad_quaternion,    ///< norm off one by more than quaternion_tolerance
   bad_length,        ///< chord or pose of a segment that no bend explains: wrong or swapped bodies
   jump,              ///< u moved faster than max_speed_radps
-  not_seen           ///< no segment has both its ends
+  not_seen,          ///< no segment has both its ends
+  bad_torsion        ///< a segment is turned about its own axis: a body recognised turned
 };
+inline constexpr int kFrameVerdicts = static_cast<int>(FrameVerdict::bad_torsion) + 1;
+
+/// As above, in static storage; "unknown" for a value outside the enumeration.
+const char* name(FrameVerdict verdict) noexcept;
 
 /// Totals since construction.
 struct FrameCounters {
@@ -38,17 +44,21 @@ struct FrameCounters {
   std::int64_t bad_length = 0;
   std::int64_t jump = 0;
   std::int64_t not_seen = 0;
+  std::int64_t bad_torsion = 0;
+  std::int64_t stale = 0;  ///< accepted or not seen, with a body that repeats an old pose
 
+  /// How often there was this verdict.
+  std::int64_t of(FrameVerdict verdict) const noexcept;
   /// Every frame dropped for what it is; repeated frames are no fault and count apart.
   std::int64_t rejected() const noexcept {
     return out_of_order + restarted + wrong_size + not_finite + bad_quaternion + bad_length + jump +
-           not_seen;
+           not_seen + bad_torsion;
   }
 };
 
 /// Judges one frame after the other. Reads no clock; a frame's own capture time is all the time it
-/// knows. A body that was not seen makes the segments it bounds unobserved, not the frame wrong.
-/// Allocates nothing after construction.
+/// knows. A body that was not seen, or only repeats an old pose (StaleBodies), makes the segments it
+/// bounds unobserved, not the frame wrong. Allocates nothing after construction.
 class FrameValidator {
  public:
   /// The estimator is copied; lengths and noise come from `arm` and `noise` as in
@@ -59,7 +69,10 @@ class FrameValidator {
                  std::span<const BodyNoise> noise);
 
   /// Judges the next frame in order of arrival and counts it.
-  FrameVerdict accept(const MocapFrame& frame) noexcept;
+  FrameVerdict accept(const MocapFrame& frame, const CommandedMotion& commanded = {}) noexcept;
+
+  /// The newest accepted frame; its stale bodies are not valid.
+  const MocapFrame& newest() const noexcept { return last_; }
 
   /// u and residuals of the newest accepted frame.
   const CurvatureEstimate& estimate() const noexcept { return estimate_; }
@@ -75,15 +88,18 @@ class FrameValidator {
   void reset() noexcept;
 
  private:
-  FrameVerdict judge(const MocapFrame& frame) noexcept;
+  FrameVerdict judge(const MocapFrame& frame, const CommandedMotion& commanded) noexcept;
   FrameVerdict judge_number(std::int64_t number) noexcept;
   FrameVerdict judge_poses(const MocapFrame& frame) const noexcept;
   FrameVerdict judge_segments(const MocapFrame& frame) noexcept;
+  FrameVerdict leave_out_stale_bodies(const MocapFrame& frame,
+                                      const CommandedMotion& commanded) noexcept;
   void remember(const MocapFrame& frame) noexcept;
 
   EstimationSettings settings_;
   std::vector<double> length_m_;
   CurvatureEstimator estimator_;
+  StaleBodies stale_;
 
   FrameCounters counters_;
   bool has_number_ = false;

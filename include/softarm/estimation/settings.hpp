@@ -40,7 +40,10 @@ struct EstimationSettings {
   // A frame is rejected where it violates one of these.
   double quaternion_tolerance = 0.02;
   double length_tolerance = 0.3;
+  double torsion_tolerance_rad = 0.5;
   double max_speed_radps = 50.0;
+  // A body that repeats its pose in so many frames while others move counts as not seen; 0: off.
+  int stale_frames = 5;
 };
 
 }  // namespace softarm

@@ -18,6 +18,7 @@
 #include "softarm/control/reference.hpp"
 #include "softarm/estimation/curvature_filter.hpp"
 #include "softarm/estimation/frame_validator.hpp"
+#include "softarm/runtime/activation_limit.hpp"
 #include "softarm/runtime/following.hpp"
 #include "softarm/runtime/safety_monitor.hpp"
 #include "softarm/runtime/settings.hpp"
@@ -62,7 +63,9 @@ struct TickOutput {
   bool soft_limit = false;      ///< the arm is beyond max_theta_rad or max_speed_radps
   bool bounded = false;         ///< the controller bounded something near a singularity
   bool length_warning = false;  ///< a segment is not as long as configured
-  std::int64_t frame_number = -1;                                 ///< newest accepted frame
+  std::int64_t frame_number = -1;  ///< newest accepted frame
+  /// Why the newest frame was refused; `accepted` where it was not.
+  FrameVerdict refusal = FrameVerdict::accepted;
   double frame_age_s = std::numeric_limits<double>::quiet_NaN();  ///< now minus its capture
   /// u and u' predicted to the middle of the period that begins now; of the model-based observer,
   /// later by control.delay_s, when the command acts.
@@ -106,13 +109,13 @@ class ControlPipeline {
   void forget_command() noexcept;
   void validate_and_estimate(const TickInput& input, SafetyInput& safety) noexcept;
   void watch(const TickInput& input, SafetyInput& safety) noexcept;
-  void use_frame(const MocapFrame& frame) noexcept;
+  void use_frame() noexcept;
   void predict(std::int64_t now_ns, std::int64_t at_ns) noexcept;
   void expect(std::int64_t at_ns) noexcept;
   void take_reference(const TickInput& input) noexcept;
   void control(std::int64_t act_ns) noexcept;
   void limit(Mode mode) noexcept;
-  bool poses_frozen() const noexcept;
+  bool poses_frozen(std::int64_t now_ns) const noexcept;
   bool beyond_soft_limit(bool speed_too) const noexcept;
   double seconds(std::int64_t time_ns) const noexcept { return to_seconds(time_ns - epoch_ns_); }
 
@@ -124,11 +127,15 @@ class ControlPipeline {
   std::unique_ptr<ModelObserver> observer_;  ///< where it is configured
   std::int64_t delay_ns_;                    ///< that they and the controller look ahead by
   SafetyMonitor safety_;
+  ActivationLimit activation_limit_;
+  std::int64_t answer_ns_;  ///< in which a command that moved must show in frames that are not late
   Reference reference_;
   CurvatureController controller_;
   PressureAllocator allocator_;
   PressureRamps ramps_;
   PressureWatch pressure_watch_;
+  CommandMoves command_moves_;
+  FramePeriodWatch frame_period_watch_;
   CurvatureWatch curvature_watch_;
   OscillationWatch oscillation_watch_;
   LengthWatch length_watch_;
@@ -139,9 +146,10 @@ class ControlPipeline {
   ControlOutput control_;
   Allocation allocation_;
   PressureVector previous_bar_;
-  SegmentVector previous_tau_nm_;               ///< that these give
-  SegmentVector commanded_tau_nm_;              ///< scratch of what is sent now
-  PressureVector pressure_at_last_motion_bar_;  ///< commanded when the poses last changed
+  SegmentVector previous_tau_nm_;                ///< that these give
+  SegmentVector commanded_tau_nm_;               ///< scratch of what is sent now
+  PressureVector pressure_at_last_motion_bar_;   ///< commanded when the poses last changed
+  std::int64_t unanswered_since_ns_ = kForever;  ///< when the command moved away from it
   std::array<std::int64_t, kMaxSegments> seen_ns_{};
   std::int64_t epoch_ns_ = 0;
   std::int64_t previous_ns_ = 0;

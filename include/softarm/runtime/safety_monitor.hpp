@@ -47,9 +47,12 @@ enum class Reason : std::int8_t {
   oscillation,
   length_mismatch,
   foreign_commands,
-  requests_lost
+  requests_lost,
+  frames_refused,  ///< frames_late or frames_stale, where frames come but are refused
+  frame_period_mismatch,
+  activated_too_often
 };
-inline constexpr int kReasons = static_cast<int>(Reason::requests_lost) + 1;
+inline constexpr int kReasons = static_cast<int>(Reason::activated_too_often) + 1;
 
 /// As above, in static storage; "unknown" for a value outside the enumeration.
 const char* name(Mode mode) noexcept;
@@ -102,8 +105,11 @@ struct SafetyInput {
   std::int64_t now_ns = 0;
   std::int64_t newest_capture_ns = kNever;  ///< of the segment seen longest ago
   bool motion_unknown = false;              ///< u of some segment is not known at this tick
-  int good_frames = 0;  ///< accepted since the last tick with every segment seen
-  int bad_frames = 0;   ///< the others
+  int good_frames = 0;                 ///< accepted since the last tick with every segment seen
+  int bad_frames = 0;                  ///< the others
+  bool frames_refused = false;         ///< the newest frame that came was refused for what it is
+  bool frame_period_mismatch = false;  ///< frames come much faster than declared
+  bool activated_too_often = false;    ///< without an operator in between
   bool sender_restarted = false;
   bool poses_frozen = false;  ///< poses repeat bit for bit although the command has moved
   bool soft_limit_exceeded = false;

@@ -23,6 +23,7 @@ struct SafetySettings {
   double hold_after_s = 0.0;
   double vent_after_s = 0.0;
   int good_frames = 50;
+  int most_activations = 5;  ///< a minute, without an operator's `arm`
   double max_latency_s = 0.05;
   int frozen_frames = 100;
   int hold_overruns = 3;

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "softarm/actuation/pressure_allocator.hpp"
+#include "softarm/estimation/frame_validator.hpp"
 #include "softarm/model/arm.hpp"
 #include "softarm/runtime/safety_monitor.hpp"
 
@@ -39,6 +40,7 @@ struct ArmStatus {
   double frame_age_s = std::numeric_limits<double>::quiet_NaN();
   std::int64_t frames_accepted = 0;
   std::int64_t frames_rejected = 0;
+  FrameVerdict refusal = FrameVerdict::accepted;  ///< of the newest frame, if it was refused
   std::int64_t frames_repeated = 0;
   std::int64_t frames_missing = 0;
   std::int64_t overruns = 0;  ///< ticks missed
@@ -57,6 +59,8 @@ struct ArmStatus {
   bool may_pressurise() const noexcept {
     return armed || mode == Mode::active || mode == Mode::hold;
   }
+  /// The reason, such as "frames_stale" or "frames_refused: bad_length".
+  std::string reason_text() const;
   /// Mode and reason, such as "VENT (frames_stale)".
   std::string text() const;
 };

@@ -78,6 +78,10 @@ class DaemonLink {
   std::int32_t asked_us() const noexcept { return messages_.pressure_command.validity_us; }
   /// Messages that could not be decoded.
   std::int64_t malformed() const noexcept { return malformed_; }
+  /// Measurements older by their sender's clock than the one before: two senders, or a restart.
+  std::int64_t backward_measurements() const noexcept { return backward_measurements_; }
+  /// References with a number that is not above the newest.
+  std::int64_t backward_references() const noexcept { return backward_references_; }
   /// Publications that failed, and commands that were too late to send.
   std::int64_t unsent() const noexcept { return unsent_; }
 
@@ -140,6 +144,8 @@ class DaemonLink {
   std::int32_t valves_expired_ = 0, granted_us_ = 0;
   std::int64_t valves_heard_ns_ = kNever;
   std::int64_t malformed_ = 0;
+  std::int64_t measurement_time_us_ = kNever;
+  std::int64_t backward_measurements_ = 0, backward_references_ = 0;
   std::int64_t unsent_ = 0;
 
   softarm_messages::curvature_reference_t reference_message_;

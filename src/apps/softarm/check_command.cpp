@@ -50,6 +50,7 @@ int check(const CheckOptions& options) {
     fmt::print(stderr, "{}: warning: {}\n", options.file, warning);
   fmt::print("# {}, configuration {}\n{}", options.file, hash_text(experiment.hash),
              resolved_text(experiment));
+  for (const std::string& line : reaction_times(experiment)) fmt::print("# {}\n", line);
   print_margins(loop.configured);
   print_margins(loop.worst);
   return kExitOk;

@@ -25,7 +25,8 @@ void listen(ArmClient& client, Observer& observer, double time_s, Progress& prog
 
 int print(const std::vector<Finding>& findings, bool json) {
   fmt::print("{}", json ? report_json(findings) : report_text(findings));
-  return any_failed(findings) ? kExitFailure : kExitOk;
+  if (any_failed(findings)) return kExitFailure;
+  return any_not_checked(findings) ? kExitNotChecked : kExitOk;
 }
 
 int pulse(const LiveCheckOptions& options, ArmClient& client, Observer& observer,

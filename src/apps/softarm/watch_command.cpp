@@ -31,7 +31,7 @@ std::string progress_text(const StatusRecord& record, double duration_s) {
   const ArmStatus& status = record.status();
   std::string text = fmt::format("{:6.1f} s {:<11} frame age {:4.1f} ms ", record.time_s(),
                                  name(status.mode), 1e3 * status.frame_age_s);
-  if (status.mode != Mode::active) text += fmt::format(" ({})", name(status.reason));
+  if (status.mode != Mode::active) text += " (" + status.reason_text() + ")";
   if (status.shadow) text += " shadow";
   if (duration_s > 0.0) text += fmt::format(" {:3.0f} %", 100.0 * record.active_s() / duration_s);
   for (int i = 0; i < std::min(status.segments(), 4); ++i)

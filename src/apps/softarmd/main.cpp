@@ -15,6 +15,7 @@
 #include "softarm/base/version.hpp"
 #include "softarm/config/load.hpp"
 #include "softarm/transport/daemon_loop.hpp"
+#include "softarm/transport/input_report.hpp"
 #include "softarm/transport/lcm_node.hpp"
 #include "softarm/transport/settings.hpp"
 
@@ -71,7 +72,8 @@ class Latched {
 };
 
 /// Prints every change of mode or reason, and what was refused; reports to the service manager.
-void run(DaemonLoop& loop, LineLog& log, ServiceNotifier& service, Latched* latched) {
+void run(DaemonLoop& loop, LineLog& log, ServiceNotifier& service, const LcmSettings& lcm,
+         Latched* latched) {
   constexpr std::int64_t kRefused_ns = 1'000'000'000;  // malformed messages may come at any rate
   Mode mode = Mode::init;
   Reason reason = Reason::none;
@@ -82,6 +84,20 @@ void run(DaemonLoop& loop, LineLog& log, ServiceNotifier& service, Latched* latc
     log.add("{} malformed messages refused, {} in all", total - refused, total);
     refused = total;
     refused_reported_ns = now_ns;
+  };
+  InputReport report_inputs;
+  const auto report_streams = [&](std::int64_t now_ns) {
+    const InputReport::Counts counts{
+        .mode = mode,
+        .frames = loop.pipeline().counters(),
+        .late_frames = loop.pipeline().late_frames(),
+        .frame_channel = lcm.mocap_channel,
+        .measurements = {lcm.measurement_channel, loop.link().backward_measurements()},
+        .references = {lcm.reference_channel, loop.link().backward_references()}};
+    if (const auto text = report_inputs.refusals(now_ns, counts); !text.empty())
+      log.add("{}", text);
+    if (const auto text = report_inputs.second_sender(now_ns, counts); !text.empty())
+      log.add("{}", text);
   };
   std::int32_t held_us = loop.link().asked_us();
   const auto report_validity = [&] {
@@ -101,10 +117,12 @@ void run(DaemonLoop& loop, LineLog& log, ServiceNotifier& service, Latched* latc
                mode = output.mode;
                reason = output.reason;
                if (latched != nullptr) latched->note(mode, reason);
-               log.add("{:.3f} s: {} ({})", to_seconds(report.since_start_ns), name(mode),
-                       name(reason));
+               const bool verdict = reason == Reason::frames_refused;
+               log.add("{:.3f} s: {} ({}{}{})", to_seconds(report.since_start_ns), name(mode),
+                       name(reason), verdict ? ": " : "", verdict ? name(output.refusal) : "");
              }
              report_refused(report.woken_ns);
+             report_streams(report.woken_ns);
              report_validity();
              service.report(report.woken_ns, {.state = name(mode),
                                               .reason = name(reason),
@@ -154,7 +172,7 @@ int serve(const std::string& path, bool shadow) {
                   shadow);
   apply_realtime_settings(realtime);
   if (latched && latched->begins_stopped()) loop.begin_stopped();
-  run(loop, log, service, latched ? &*latched : nullptr);
+  run(loop, log, service, lcm, latched ? &*latched : nullptr);
   log.finish();
   print_summary(loop);
   return kExitOk;

@@ -31,6 +31,10 @@ bool any_failed(std::span<const Finding> findings) noexcept {
   return count(findings, Verdict::fail) > 0;
 }
 
+bool any_not_checked(std::span<const Finding> findings) noexcept {
+  return count(findings, Verdict::not_checked) > 0;
+}
+
 bool failed(std::span<const Finding> findings, const std::string& check) noexcept {
   return std::any_of(findings.begin(), findings.end(), [&](const Finding& each) {
     return each.verdict == Verdict::fail && each.check == check;

@@ -58,7 +58,8 @@ void Observer::take_frame(const CapturedFrame& captured) {
                           captured.sender_us,
                           captured.frame.frame_number,
                           {body.begin(), body.begin() + bodies},
-                          {other_frame_.body.begin(), other_frame_.body.begin() + bodies}});
+                          {other_frame_.body.begin(), other_frame_.body.begin() + bodies},
+                          captured.frame.capture_ns});
 }
 
 /// Notes bodies that are not configured.

@@ -167,13 +167,15 @@ std::vector<Finding> preflight(const Experiment& experiment, const Observation& 
   const std::vector<Finding> geometry = check_geometry(experiment, seen);
   const std::vector<Finding> valves = check_valves(experiment, seen, geometry);
   out.insert(out.end(), geometry.begin(), geometry.end());
+  check_acceptance(experiment, seen, out);
   out.insert(out.end(), valves.begin(), valves.end());
   return out;
 }
 
 std::string obstacle_to_pulses(const std::vector<Finding>& at_rest) {
   std::vector<std::string> blocking;
-  for (const char* check : {kBodies, kStillCheck, kUnits, kOrder, kWorldAxes, kQuaternions})
+  for (const char* check :
+       {kBodies, kStillCheck, kUnits, kOrder, kWorldAxes, kQuaternions, kAccepted})
     if (failed(at_rest, check)) blocking.push_back(check);
   return blocking.empty() ? "" : fmt::format("{}", fmt::join(blocking, ", "));
 }

@@ -92,6 +92,8 @@ TEST_F(Injector, MakesTheFaultsItNames) {
             (Verdicts{{FrameVerdict::accepted, 39}, {FrameVerdict::sender_restarted, 1}}));
   EXPECT_EQ(verdicts("freeze"), (Verdicts{{FrameVerdict::accepted, 40}}));
   EXPECT_EQ(verdicts("occlude"), (Verdicts{{FrameVerdict::accepted, 40}})) << "one segment is seen";
+  EXPECT_EQ(verdicts("turn"), (Verdicts{{FrameVerdict::bad_torsion, 40}}));
+  EXPECT_GT(verdicts("stale")[FrameVerdict::accepted], 0) << "its segment is not seen";
   const Verdicts swapped = verdicts("swap");
   EXPECT_EQ(swapped.count(FrameVerdict::accepted), 0u);
 }
@@ -158,6 +160,13 @@ TEST_F(Injector, CorruptsPressures) {
   injector.set(leak);
   EXPECT_TRUE(injector.pass(measured));
   EXPECT_EQ(measured.pressure_bar, (std::vector<float>{1.0F, 1.5F, 0.0F}));
+  Fault stick = *find_fault("stick");
+  stick.body = 0;
+  injector.set(stick);
+  EXPECT_TRUE(injector.pass(measured));
+  measured.pressure_bar[0] = 0.5F;
+  EXPECT_TRUE(injector.pass(measured));
+  EXPECT_EQ(measured.pressure_bar[0], 1.0F);
   injector.set(*find_fault("silence"));
   EXPECT_FALSE(injector.pass(measured));
 }

@@ -54,8 +54,9 @@ class FaultTest : public ::testing::TestWithParam<Machine>, protected Station {
   void configure(Station& station, const std::string& safety = "", const std::string& more = "",
                  const std::string& rest = "") const {
     station.write_config("paper_arm.yaml",
-                         std::string("  safety: {") + kPatientSafety + ", frozen_frames: 40" +
-                             safety + "}\n" + realtime() + more,
+                         std::string("  safety: {") + kPatientSafety +
+                             ", frozen_frames: 40, most_activations: 20" + safety + "}\n" +
+                             realtime() + more,
                          rest);
   }
   static std::string realtime() {

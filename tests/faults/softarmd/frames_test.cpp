@@ -43,19 +43,36 @@ TEST_P(FrameFaults, WithoutGoodFramesTheDaemonHoldsThenVents) {
   struct Row {
     const char* fault;
     double amount;
-    bool rejected;  ///< the frames came and are counted as refused
+    bool rejected;              ///< the frames came and are counted as refused
+    FrameVerdict refusal = {};  ///< that names itself; accepted: none
   };
   for (const Row& row :
-       {Row{"stop", 0.0, false}, Row{"occlude", 0.0, false}, Row{"nan", 0.0, true},
-        Row{"inf", 0.0, true}, Row{"quaternion", 0.0, true}, Row{"length", 0.0, true},
-        Row{"swap", 0.0, true}, Row{"delay", 0.3, true}}) {
+       {Row{"stop", 0.0, false}, Row{"occlude", 0.0, false},
+        Row{"nan", 0.0, true, FrameVerdict::not_finite},
+        Row{"inf", 0.0, true, FrameVerdict::not_finite},
+        Row{"quaternion", 0.0, true, FrameVerdict::bad_quaternion},
+        Row{"length", 0.0, true, FrameVerdict::bad_length},
+        Row{"turn", 1.5708, true, FrameVerdict::bad_torsion},
+        Row{"turn", 2.0944, true, FrameVerdict::bad_torsion},
+        Row{"swap", 0.0, true, FrameVerdict::bad_length}, Row{"delay", 0.3, true}}) {
     SCOPED_TRACE(row.fault);
     const std::int64_t rejected = status_.frames_rejected;
     inject(row.fault, row.amount);
-    EXPECT_TRUE(becomes(*this, Mode::vent, Reason::frames_stale))
+    const bool named = row.refusal != FrameVerdict::accepted;
+    EXPECT_TRUE(becomes(*this, Mode::vent, named ? Reason::frames_refused : Reason::frames_stale))
         << seen_text() << daemon_->printed();
-    EXPECT_TRUE(saw(Mode::hold, Reason::frames_late)) << seen_text();
+    EXPECT_TRUE(saw(Mode::hold, named ? Reason::frames_refused : Reason::frames_late))
+        << seen_text();
     EXPECT_TRUE(wait_for([&] { return largest(command_.pressure_bar) == 0.0F; })) << seen_text();
+    if (named) {
+      EXPECT_EQ(status_.refusal, row.refusal) << name(status_.refusal);
+      EXPECT_TRUE(wait_for([&] {
+        const std::string printed = daemon_->printed();
+        return printed.find(std::string("VENT (frames_refused: ") + name(row.refusal)) !=
+                   std::string::npos &&
+               printed.find(std::string(" ") + name(row.refusal)) != std::string::npos;
+      })) << daemon_->printed();
+    }
     if (row.rejected) {
       EXPECT_TRUE(wait_for([&] { return status_.frames_rejected > rejected + 5; }));
     } else {
@@ -67,6 +84,33 @@ TEST_P(FrameFaults, WithoutGoodFramesTheDaemonHoldsThenVents) {
     recovers();
   }
   expect_limits(*this);
+}
+
+// A sender that has lost one body, and sends its last pose for valid.
+TEST_P(FrameFaults, OneFrozenBodyHoldsThenVents) {
+  for (const int body : {1, 2, 3}) {
+    SCOPED_TRACE(body);
+    inject("stale", 0.0, body);
+    EXPECT_TRUE(wait_for([&] { return mode() == Mode::vent; })) << seen_text();
+    EXPECT_TRUE(saw(Mode::hold, Reason::frames_late)) << seen_text();
+    EXPECT_TRUE(wait_for([&] {
+      return daemon_->printed().find("in which a body repeats an old pose") != std::string::npos;
+    })) << daemon_->printed();
+    recovers();
+  }
+  expect_limits(*this);
+}
+
+// A second sender on the frames' channel, with other numbers.
+TEST_P(FrameFaults, ASecondSenderIsReportedOnce) {
+  const auto second = start("softarm-plant");
+  EXPECT_TRUE(wait_for([&] {
+    return daemon_->printed().find("two senders on SOFTARM_MOCAP?") != std::string::npos;
+  })) << daemon_->printed();
+  const int statuses = statuses_;
+  EXPECT_TRUE(wait_for([&] { return statuses_ > statuses + 1500; }));  // three more seconds
+  const std::string printed = daemon_->printed();
+  EXPECT_EQ(printed.find("two senders"), printed.rfind("two senders")) << printed;
 }
 
 TEST_P(FrameFaults, WhatIsDroppedOrCompensatedDisturbsNothing) {

@@ -97,7 +97,8 @@ TEST_P(PeopleAndValves, SilentOrLeakingValvesAreALatchedFault) {
     Reason reason;
   };
   for (const Row& row :
-       {Row{"silence", Reason::valves_silent}, Row{"burst", Reason::pressure_mismatch}}) {
+       {Row{"silence", Reason::valves_silent}, Row{"burst", Reason::pressure_mismatch},
+        Row{"stick", Reason::pressure_mismatch}}) {
     SCOPED_TRACE(row.fault);
     // A burst shows where there should be pressure: in the fullest chamber.
     arm_when_asked();

@@ -63,6 +63,8 @@ const std::vector<Trigger> kTriggers = {
      [](SafetyInput& in) { in.newest_capture_ns = in.now_ns - kHold - kStep; }},
     {Reason::frames_late, 11, [](SafetyInput& in) { in.motion_unknown = true; }},
     {Reason::poses_frozen, 12, [](SafetyInput& in) { in.poses_frozen = true; }},
+    {Reason::frame_period_mismatch, 20, [](SafetyInput& in) { in.frame_period_mismatch = true; }},
+    {Reason::activated_too_often, 21, [](SafetyInput& in) { in.activated_too_often = true; }},
     {Reason::overruns, 10, [](SafetyInput& in) { in.consecutive_overruns = kHoldOverruns; }},
     {Reason::overruns, 10, [](SafetyInput& in) { in.consecutive_overruns = kVentOverruns - 1; }},
 };
@@ -286,8 +288,15 @@ class Judge {
       return require(reason == waits, "WAIT_FRAMES names what it waits for");
     }
     if (reason == Reason::waiting_for_arm)
-      return require((!seen.may_move || reason_before == reason) && mode != Mode::fault,
-                     "an armed arm does not wait for it");
+      return require(
+          !seen.may_move && seen.run == kGoodFrames && present_.none() && mode != Mode::fault,
+          "an arm waits for arming only where nothing else holds it");
+    // In VENT after it had waited for arming, and frames became bad again.
+    const bool waited =
+        reason_before == Reason::waiting_for_arm || reason_before == Reason::waiting_for_frames;
+    if (reason == Reason::waiting_for_frames)
+      return require(mode == Mode::wait_frames || (mode == Mode::vent && waited),
+                     "waiting for frames is WAIT_FRAMES, or VENT after all else");
     // Of the causes that made the mode, the first in the table; that which made it stays.
     for (std::size_t k = 0; k < cause_table().size(); ++k) {
       const CauseRule& rule = cause_table()[k];
@@ -296,6 +305,11 @@ class Judge {
           mode == Mode::fault && before == Mode::fault && rule.reason != Reason::emergency_stop;
       if (!present_[k] || !wins || keeps) continue;
       return require(reason == rule.reason, "the reason is the most severe cause");
+    }
+    if (mode == Mode::vent && reason_before == Reason::waiting_for_arm && present_.any()) {
+      std::size_t first = 0;
+      while (!present_[first]) ++first;
+      return require(reason == cause_table()[first].reason, "what holds it now is its reason");
     }
     require(mode == before && reason == reason_before, "without a new cause the reason stays");
   }

@@ -5,10 +5,12 @@
 #include <algorithm>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <ostream>
 #include <string>
 #include <vector>
 
+#include "softarm/runtime/activation_limit.hpp"
 #include "softarm/runtime/safety_monitor.hpp"
 #include "softarm/runtime/settings.hpp"
 
@@ -33,7 +35,9 @@ class Bench {
     if (frames) input.newest_capture_ns = input.now_ns - 5 * kMs;
     if (measurements) input.newest_measurement_ns = input.now_ns;
     if (go) input.newest_go_ns = input.now_ns;
+    if (limit) input.activated_too_often = limit->reached(input.now_ns, monitor);
     const Mode mode = monitor.step(input);
+    if (limit) limit->note(input.now_ns, last_mode, input.requests.arm, monitor);
     input.requests.arm = input.requests.disarm = input.requests.emergency_stop =
         input.requests.lost = input.sender_restarted = false;
     // Pressure is there after a while under control, and gone after a while of venting.
@@ -57,6 +61,7 @@ class Bench {
   }
 
   SafetyMonitor monitor;
+  std::optional<ActivationLimit> limit;  ///< none: the input says it
   SafetyInput input{.now_ns = 1'000'000'000};
   bool frames = true, measurements = true, go = true;
   std::int64_t gap_ns = 0;
@@ -126,6 +131,12 @@ const std::vector<Row>& rows() {
        [](Bench& b) { b.input.sender_restarted = true; }, nothing},
       {Reason::frames_stale, Mode::vent, Clearance::good_frames, false, 50,
        [](Bench& b) { b.frames = false; }, [](Bench& b) { b.frames = true; }},
+      {Reason::activated_too_often, Mode::vent, Clearance::arm, false, 1,
+       [](Bench& b) { b.input.activated_too_often = true; },
+       [](Bench& b) { b.input.activated_too_often = false; }},
+      {Reason::frame_period_mismatch, Mode::vent, Clearance::good_frames, false, 1,
+       [](Bench& b) { b.input.frame_period_mismatch = true; },
+       [](Bench& b) { b.input.frame_period_mismatch = false; }},
       {Reason::many_overruns, Mode::vent, Clearance::good_frames, false, 1,
        [](Bench& b) { b.input.consecutive_overruns = 10; },
        [](Bench& b) { b.input.consecutive_overruns = 0; }},
@@ -253,6 +264,131 @@ TEST(CauseTableInCode, SaysWhatIsTestedHereAndNoMore) {
     EXPECT_EQ(rule.demands, row->mode) << name(rule.reason);
     EXPECT_EQ(rule.clearance, row->clearance) << name(rule.reason);
   }
+}
+
+/// Frames fail and come again, for so many activations or ticks.
+int activations_of(Bench& bench, int ticks) {
+  int activations = 0;
+  Mode before = bench.monitor.mode();
+  for (int k = 0; k < ticks; ++k) {
+    bench.frames = k % 250 < 170;
+    const Mode mode = bench.tick();
+    if (mode == Mode::active && before != Mode::active) ++activations;
+    before = mode;
+  }
+  return activations;
+}
+
+TEST(ActivatedTooOften, AnAutomaticArmStaysVentedUntilItIsArmedByHand) {
+  Bench bench(Arming::automatic);
+  bench.limit.emplace(SafetySettings{});
+  EXPECT_EQ(activations_of(bench, 20000), 5) << "of forty in 40 s";
+  EXPECT_EQ(bench.monitor.mode(), Mode::vent);
+  EXPECT_FALSE(bench.monitor.armed());
+  bench.frames = true;
+  bench.run(60'000);  // two minutes later it still does
+  EXPECT_EQ(bench.monitor.mode(), Mode::vent);
+  EXPECT_EQ(bench.monitor.reason(), Reason::waiting_for_arm);
+  bench.input.requests.arm = true;
+  EXPECT_EQ(bench.tick(), Mode::active);
+  EXPECT_EQ(activations_of(bench, 20000), 4) << "five in the minute that began with the arm";
+}
+
+TEST(ActivatedTooOften, NamesItself) {
+  Bench bench(Arming::automatic);
+  bench.limit.emplace(SafetySettings{});
+  bool named = false;
+  for (int k = 0; k < 20000; ++k) {
+    bench.frames = k % 250 < 170;
+    bench.tick();
+    named |= bench.monitor.reason() == Reason::activated_too_often;
+  }
+  EXPECT_TRUE(named);
+}
+
+TEST(ActivatedTooOften, OnceAMinuteIsNotTooOftenNorIsLeavingHold) {
+  Bench bench(Arming::automatic);
+  bench.limit.emplace(SafetySettings{});
+  for (int k = 0; k < 12; ++k) {
+    bench.frames = true;
+    ASSERT_EQ(bench.run(7'000), Mode::active) << k;  // 14 s
+    bench.frames = false;
+    ASSERT_EQ(bench.run(80), Mode::vent);
+  }
+  bench.frames = true;
+  ASSERT_EQ(bench.run(7'000), Mode::active);
+  for (int k = 0; k < 100; ++k) {
+    bench.input.poses_frozen = true;
+    ASSERT_EQ(bench.tick(), Mode::hold);
+    bench.input.poses_frozen = false;
+    ASSERT_EQ(bench.run(60), Mode::active) << k;
+  }
+}
+
+TEST(ActivatedTooOften, WhereAnOperatorArmsEveryTimeItIsTheOperatorsDecision) {
+  Bench bench(Arming::explicit_);
+  bench.limit.emplace(SafetySettings{});
+  for (int k = 0; k < 20; ++k) {
+    bench.frames = true;
+    bench.run(400);
+    bench.input.requests.arm = true;
+    ASSERT_EQ(bench.tick(), Mode::active) << k;
+    bench.frames = false;
+    ASSERT_EQ(bench.run(80), Mode::vent);
+  }
+}
+
+TEST(Refused, FramesThatComeAndAreRefusedAreNamedSo) {
+  Bench bench(Arming::automatic);
+  bench.frames = false;
+  bench.input.frames_refused = true;
+  bench.run(100);
+  EXPECT_EQ(bench.monitor.mode(), Mode::wait_frames);
+  EXPECT_EQ(bench.monitor.reason(), Reason::frames_refused);
+  bench.frames = true;
+  bench.input.frames_refused = false;
+  bench.activate();
+  bench.frames = false;
+  bench.input.frames_refused = true;
+  bench.run(20);
+  EXPECT_EQ(bench.monitor.mode(), Mode::hold);
+  EXPECT_EQ(bench.monitor.reason(), Reason::frames_refused);
+  bench.run(50);
+  EXPECT_EQ(bench.monitor.mode(), Mode::vent);
+  EXPECT_EQ(bench.monitor.reason(), Reason::frames_refused);
+}
+
+TEST(Waiting, AVentedArmWaitsForAnArmOnlyWhereNothingElseHoldsIt) {
+  Bench bench(Arming::explicit_);
+  bench.activate();
+  bench.input.requests.disarm = true;
+  bench.run(400);
+  ASSERT_EQ(bench.monitor.reason(), Reason::waiting_for_arm);
+  bench.input.bad_frames = 1;  // one bad frame: fifty more are needed
+  bench.input.frames_refused = true;
+  bench.tick();
+  EXPECT_EQ(bench.monitor.reason(), Reason::frames_refused);
+  bench.input.bad_frames = 0;
+  bench.input.frames_refused = false;
+  bench.run(10);
+  EXPECT_EQ(bench.monitor.reason(), Reason::frames_refused) << "until fifty are good";
+  bench.run(60);
+  EXPECT_EQ(bench.monitor.reason(), Reason::waiting_for_arm);
+  bench.input.bad_frames = 1;  // accepted, but of an arm that is partly hidden
+  bench.tick();
+  EXPECT_EQ(bench.monitor.reason(), Reason::waiting_for_frames);
+  bench.input.bad_frames = 0;
+  bench.run(60);
+  EXPECT_EQ(bench.monitor.reason(), Reason::waiting_for_arm);
+  bench.frames = false;
+  bench.run(20);
+  EXPECT_EQ(bench.monitor.reason(), Reason::frames_late);
+  bench.frames = true;
+  bench.run(60);
+  EXPECT_EQ(bench.monitor.reason(), Reason::waiting_for_arm);
+  bench.input.poses_frozen = true;
+  bench.tick();
+  EXPECT_EQ(bench.monitor.reason(), Reason::poses_frozen);
 }
 
 TEST(CauseTableInCode, TheMoreSevereComeFirst) {

@@ -6,6 +6,8 @@
 
 #include <bit>
 #include <cstring>
+#include <optional>
+#include <random>
 #include <vector>
 
 #include "softarm/estimation/model_observer.hpp"
@@ -62,6 +64,87 @@ TEST_F(Pipeline, FrozenPosesHoldWhileTheCommandMoves) {
   bench.run(500);
   EXPECT_EQ(bench.pipeline.output().mode, Mode::hold) << "frozen frames are not good frames";
   EXPECT_EQ(bench.pipeline.output().pressure_bar, held);
+}
+
+// The declared noise on every body, and then one repeats its last pose.
+TEST_F(Pipeline, OneFrozenSegmentEndIsHeldThenVented) {
+  for (const ObserverKind observer : {ObserverKind::kinematic, ObserverKind::model}) {
+    for (std::size_t body = 1; body <= 3; ++body) {
+      SCOPED_TRACE(body);
+      Experiment noisy = experiment;
+      noisy.estimation.observer = observer;
+      PipelineBench bench(noisy);
+      std::mt19937 random(3);
+      std::optional<BodyPose> last;
+      bool freeze = false;
+      bench.corrupt = [&](MocapFrame& frame) {
+        std::normal_distribution<double> noise(0.0, 0.2e-3);
+        for (std::size_t b = 0; b <= 3; ++b)
+          for (double& each : frame.body[b].position_m) each += noise(random);
+        if (freeze && !last) last = frame.body[body];
+        if (freeze) frame.body[body] = *last;
+        return true;
+      };
+      bend(bench);
+      bench.run(1000);
+      ASSERT_EQ(bench.pipeline.output().mode, Mode::active);
+      freeze = true;
+      const int ticks = bench.run_to(Mode::hold, 200);
+      EXPECT_GT(ticks, 0);
+      EXPECT_LT(ticks, 75) << "150 ms";
+      EXPECT_LT(bench.run_to(Mode::vent, 200), 60);
+      freeze = false;
+      EXPECT_GT(bench.run_to(Mode::active, 1000), 0) << "it was seen again";
+    }
+  }
+}
+
+TEST_F(Pipeline, ATurnedBodyIsRefusedBeforeArmingToo) {
+  PipelineBench bench(experiment);
+  bench.corrupt = [&](MocapFrame& frame) {
+    frame.body[2].orientation =
+        frame.body[2].orientation * Eigen::AngleAxisd(1.5708, Eigen::Vector3d::UnitZ());
+    return true;
+  };
+  EXPECT_EQ(bench.run_to(Mode::active, 1000), -1);
+  EXPECT_EQ(bench.pipeline.output().reason, Reason::frames_refused);
+  EXPECT_EQ(bench.pipeline.output().refusal, FrameVerdict::bad_torsion);
+  EXPECT_GT(bench.pipeline.counters().bad_torsion, 100);
+}
+
+// Declared 8.3 times too long, and every threshold derived from it too.
+TEST_F(Pipeline, FramesMuchFasterThanDeclaredKeepItVented) {
+  Experiment slip = experiment;
+  slip.safety.frame_period_s = 0.0415;
+  PipelineBench bench(slip);
+  bench.run(2000);
+  EXPECT_NE(bench.pipeline.output().mode, Mode::active);
+  EXPECT_EQ(bench.pipeline.output().reason, Reason::frame_period_mismatch);
+}
+
+// The command of an arm at rest moves at once; its poses follow later, as sensors are late.
+TEST_F(Pipeline, AnExactArmAtRestThatIsCommandedToMoveIsNotFrozen) {
+  Experiment live = experiment;
+  live.reference.phases = {{LiveReference{}, 0.0}};
+  PipelineBench bench(live);
+  bench.moves = false;
+  const MocapFrame rest = bench.exact_frame();
+  std::int64_t moves_ns = kForever;
+  bench.corrupt = [&](MocapFrame& frame) {
+    frame.body = rest.body;
+    if (bench.now_ns >= moves_ns)
+      frame.body[3].position_m.x() += 1e-7 * static_cast<double>(frame.frame_number);
+    return true;
+  };
+  ASSERT_GT(bench.run_to(Mode::active), 0);
+  bench.run(600);
+  const LiveReferenceInput step{SegmentVector::Constant(6, 0.1), SegmentVector::Zero(6),
+                                SegmentVector::Zero(6)};
+  moves_ns = bench.now_ns + 10 * kMs;
+  for (int k = 0; k < 100; ++k) {
+    bench.input.reference = &step;
+    ASSERT_EQ(bench.tick().mode, Mode::active) << k << name(bench.pipeline.output().reason);
+  }
 }
 
 TEST_F(Pipeline, AnExactArmAtRestIsNotFrozen) {

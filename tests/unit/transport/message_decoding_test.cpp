@@ -45,7 +45,7 @@ std::vector<LengthField> length_fields(const tick_record_t& record) {
   return {{76, 2}, {78, 2}, {80, 2}, {82, 2}, {frame + 16, 2}, {frame + 18 + 61 * bodies, 4}};
 }
 std::vector<LengthField> length_fields(const controller_status_t& status) {
-  const std::size_t counts = 56 + 4 + status.version.size() + 1 + 4 + 4 + 24;
+  const std::size_t counts = 56 + 4 + status.version.size() + 1 + 4 + 4 + 24 + 1;
   return {{56, 4}, {counts, 2}, {counts + 2, 2}};
 }
 

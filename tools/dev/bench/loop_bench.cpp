@@ -74,19 +74,20 @@ class Scene {
         folder_(std::filesystem::temp_directory_path() /
                 fmt::format("softarm_bench_loop_{}", getpid())) {
     std::filesystem::create_directories(folder_);
-    setenv("XDG_STATE_HOME", folder_.c_str(), 1);  // of the daemon
+    const int second_ticks = static_cast<int>(options.rate_hz);  // the longest allowed
+    setenv("XDG_STATE_HOME", folder_.c_str(), 1);                // of the daemon
     std::ofstream(folder_ / "loop.yaml") << fmt::format(
         "include: {}\nname: bench_loop\nreference: [{{kind: set_point, theta_rad: {}}}]\n"
         "daemon:\n  rate_hz: {}\n  capture_time: latency\n"
         "  lcm: {{url: \"udpm://239.255.76.67:{}?ttl=0\"}}\n"
-        "  safety: {{arming: automatic, frame_period_s: 0.01, frame_latency_s: 0, hold_after_s: "
+        "  safety: {{arming: automatic, frame_period_s: {}, frame_latency_s: 0, hold_after_s: "
         "1,\n"
-        "    vent_after_s: 2, hold_overruns: 999999, vent_overruns: 1000000, valve_readback: "
+        "    vent_after_s: 2, hold_overruns: {}, vent_overruns: {}, valve_readback: "
         "false}}\n"
         "  realtime: {{fifo: {}, priority: {}, cpu: {}}}\n",
         std::filesystem::absolute(options.config).string(), kTheta_rad, options.rate_hz,
-        20000 + getpid() % 12000, result.fifo, kPriority,
-        options.cpu < 0 ? "any" : std::to_string(options.cpu));
+        20000 + getpid() % 12000, 1.0 / options.rate_hz, second_ticks - 1, second_ticks,
+        result.fifo, kPriority, options.cpu < 0 ? "any" : std::to_string(options.cpu));
     experiment_ = load_experiment(folder_ / "loop.yaml");
     if (experiment_.transport.mocap.source != softarm_mocap())
       throw ConfigError(options.config, 0, "daemon.mocap.source",

@@ -56,6 +56,13 @@ constexpr std::array kFaults{
                      "none at rest; softarm check --live --pulse sees it"},
     FaultDescription{"leak", FaultKind::leak, "a chamber shows less pressure than it has",
                      "which part less", 0.4, "FAULT beyond pressure_tolerance_bar"},
+    FaultDescription{"stale", FaultKind::stale, "a body repeats its last pose, still valid", "",
+                     0.0, "HOLD (frames_late), then VENT (frames_stale)"},
+    FaultDescription{"turn", FaultKind::turn, "a body is recognised turned about its own axis",
+                     "by how much (rad)", 1.5707963267948966,
+                     "frames rejected (bad_torsion); HOLD, then VENT"},
+    FaultDescription{"stick", FaultKind::stick, "a chamber repeats its last measurement", "", 0.0,
+                     "FAULT (pressure_mismatch) with valve_readback, once its command has moved"},
 };
 
 Eigen::Vector3d position(const mocap_body_t& body) {
@@ -63,6 +70,12 @@ Eigen::Vector3d position(const mocap_body_t& body) {
 }
 Eigen::Quaterniond orientation(const mocap_body_t& body) {
   return {body.orientation[0], body.orientation[1], body.orientation[2], body.orientation[3]};
+}
+void put(const Eigen::Quaterniond& q, mocap_body_t& body) {
+  body.orientation[0] = q.w();
+  body.orientation[1] = q.x();
+  body.orientation[2] = q.y();
+  body.orientation[3] = q.z();
 }
 
 }  // namespace
@@ -79,6 +92,7 @@ std::optional<Fault> find_fault(const std::string& name) {
 void FaultInjector::set(const Fault& fault) {
   fault_ = fault;
   kept_.reset();
+  kept_pressure_.reset();
   restart_ = fault.kind == FaultKind::restart;
 }
 
@@ -117,10 +131,7 @@ void FaultInjector::bend_to_other_side(mocap_frame_t& frame) const {
   const Eigen::Vector3d p = position(upper) + up * (turn * t);
   const Eigen::Quaterniond q = up * (turn * r * turn.conjugate());
   for (int axis = 0; axis < 3; ++axis) lower.position_m[axis] = p[axis];
-  lower.orientation[0] = q.w();
-  lower.orientation[1] = q.x();
-  lower.orientation[2] = q.y();
-  lower.orientation[3] = q.z();
+  put(q, lower);
 }
 
 void FaultInjector::corrupt_poses(mocap_frame_t& frame) {
@@ -134,6 +145,16 @@ void FaultInjector::corrupt_poses(mocap_frame_t& frame) {
   if (fault_.kind == FaultKind::jump && taken_ % 2 == 0) bend_to_other_side(frame);
   if (fault_.kind == FaultKind::mirror)
     for (mocap_body_t& body : frame.bodies) body.position_m[1] *= -1.0;
+  if (fault_.kind == FaultKind::turn) {
+    mocap_body_t& body = frame.bodies[static_cast<std::size_t>(which)];
+    put(orientation(body) * Eigen::AngleAxisd(fault_.amount, Eigen::Vector3d::UnitZ()), body);
+  }
+  if (fault_.kind == FaultKind::stale) {
+    if (!kept_) kept_ = frame;
+    if (kept_->bodies.size() == frame.bodies.size())
+      frame.bodies[static_cast<std::size_t>(which)] =
+          kept_->bodies[static_cast<std::size_t>(which)];
+  }
   if (fault_.kind == FaultKind::freeze) {
     if (!kept_) kept_ = frame;
     frame.bodies = kept_->bodies;
@@ -177,13 +198,17 @@ std::int64_t FaultInjector::next_due_ns() const {
   return waiting_.empty() ? kForever : waiting_.front().due_ns;
 }
 
-bool FaultInjector::pass(softarm_messages::pressure_measurement_t& measurement) const {
+bool FaultInjector::pass(softarm_messages::pressure_measurement_t& measurement) {
   if (fault_.kind == FaultKind::silence) return false;
   auto& pressures = measurement.pressure_bar;
   if (pressures.empty()) return true;
   float& chosen = pressures[static_cast<std::size_t>(
       std::clamp(fault_.body, 0, static_cast<int>(pressures.size()) - 1))];
   if (fault_.kind == FaultKind::burst) chosen = 0.0F;
+  if (fault_.kind == FaultKind::stick) {
+    if (!kept_pressure_) kept_pressure_ = chosen;
+    chosen = *kept_pressure_;
+  }
   if (fault_.kind == FaultKind::leak) chosen *= 1.0F - static_cast<float>(fault_.amount);
   return true;
 }

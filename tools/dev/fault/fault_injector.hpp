@@ -35,7 +35,10 @@ enum class FaultKind {
   silence,     ///< no measured pressure goes through
   burst,       ///< chamber `body` shows no pressure
   mirror,      ///< the world's y is reversed in positions alone
-  leak         ///< chamber `body` shows a part less pressure than it has
+  leak,        ///< chamber `body` shows a part less pressure than it has
+  stale,       ///< `body` repeats its last pose, still valid
+  turn,        ///< `body` is recognised turned about its own axis
+  stick        ///< chamber `body` repeats its last measurement
 };
 
 struct Fault {
@@ -72,7 +75,7 @@ class FaultInjector {
   std::int64_t next_due_ns() const;
 
   /// Corrupts measured pressures; false: they do not go through.
-  bool pass(softarm_messages::pressure_measurement_t& measurement) const;
+  bool pass(softarm_messages::pressure_measurement_t& measurement);
 
  private:
   struct Waiting {
@@ -86,6 +89,7 @@ class FaultInjector {
   Fault fault_;
   std::deque<Waiting> waiting_;
   std::optional<softarm_messages::mocap_frame_t> kept_;  // frozen, or overtaken
+  std::optional<float> kept_pressure_;
   std::int64_t number_offset_ = 0, newest_number_ = 0;
   bool restart_ = false;
   std::int64_t taken_ = 0;

@@ -8,6 +8,9 @@ namespace {
 constexpr SoakFault frames_away(const char* name, const char* relay_fault, double amount = 0.0) {
   return {name, SoakAction::relay, relay_fault, amount, Mode::vent, Reason::frames_stale};
 }
+constexpr SoakFault frames_refused(const char* name) {
+  return {name, SoakAction::relay, name, 0.0, Mode::vent, Reason::frames_refused};
+}
 constexpr SoakFault harmless(const char* name, const char* relay_fault,
                              std::int64_t ArmStatus::*counter, int counts, double amount = 0.0) {
   return {name,         SoakAction::relay, relay_fault, amount,
@@ -17,11 +20,13 @@ constexpr SoakFault harmless(const char* name, const char* relay_fault,
 constexpr std::array kFaults{
     frames_away("stop", "stop"),
     frames_away("occlude", "occlude"),
-    frames_away("nan", "nan"),
-    frames_away("inf", "inf"),
-    frames_away("quaternion", "quaternion"),
-    frames_away("length", "length"),
-    frames_away("swap", "swap"),
+    frames_away("stale body", "stale"),
+    frames_refused("nan"),
+    frames_refused("inf"),
+    frames_refused("quaternion"),
+    frames_refused("length"),
+    frames_refused("turn"),
+    frames_refused("swap"),
     frames_away("delay 0.3 s", "delay", 0.3),
     harmless("delay 0.03 s", "delay", &ArmStatus::frames_accepted, 100, 0.03),
     harmless("clock + 1 h", "clock", &ArmStatus::frames_accepted, 100),

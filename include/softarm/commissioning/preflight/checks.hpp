@@ -11,6 +11,7 @@ namespace softarm {
 
 // Names of findings that decide about other checks.
 inline constexpr const char* kBodies = "bodies";
+inline constexpr const char* kAccepted = "accepted";
 inline constexpr const char* kStillCheck = "still";
 inline constexpr const char* kUnits = "units";
 inline constexpr const char* kOrder = "order";
@@ -40,6 +41,12 @@ std::vector<Finding> check_geometry(const Experiment& experiment, const Observat
 /// only checked if none of the findings in `geometry` that it needs failed.
 std::vector<Finding> check_valves(const Experiment& experiment, const Observation& seen,
                                   const std::vector<Finding>& geometry);
+
+/// Checks what the daemon's own validator makes of the frames: below 90 % accepted fails with the
+/// commonest verdict, or is not checked where one of `findings` failed, which may be why. Else it is
+/// added to the text of the first finding.
+void check_acceptance(const Experiment& experiment, const Observation& seen,
+                      std::vector<Finding>& findings);
 
 /// All checks, in this order.
 std::vector<Finding> preflight(const Experiment& experiment, const Observation& seen);

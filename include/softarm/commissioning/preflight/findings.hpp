@@ -21,6 +21,8 @@ struct Finding {
 
 /// Whether any of them failed.
 bool any_failed(std::span<const Finding> findings) noexcept;
+/// Whether any of them was not checked.
+bool any_not_checked(std::span<const Finding> findings) noexcept;
 /// Whether there is a finding of this check, and it failed.
 bool failed(std::span<const Finding> findings, const std::string& check) noexcept;
 

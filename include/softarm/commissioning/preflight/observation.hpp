@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "softarm/base/time.hpp"
 #include "softarm/estimation/mocap_frame.hpp"
 
 namespace softarm {
@@ -17,6 +18,8 @@ struct SeenFrame {
   std::vector<BodyPose> body;  ///< n + 1 as configured, the base first
   /// The same with the quaternions read in the order that is not configured (QuaternionOrder).
   std::vector<BodyPose> in_other_order;
+  /// On our monotonic clock as the daemon takes it; kNever: arrival less the declared latency.
+  std::int64_t capture_ns = kNever;
 };
 
 /// Pressures measured by the valves.

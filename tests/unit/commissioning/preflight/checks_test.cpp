@@ -337,5 +337,40 @@ TEST(Preflight, PressuresAndLeaks) {
   EXPECT_TRUE(fails(checked(arm, seen), "pressures", "start softarm-valves"));
 }
 
+// What the daemon would refuse, although every other check passes.
+TEST(Acceptance, IsThatOfTheDaemonsOwnValidator) {
+  const Experiment arm = hanging_arm(2);
+  const Observation right = observed(arm);
+  EXPECT_NE(finding(checked(arm, right), "bodies").text.find("the daemon accepts 100.0 %"),
+            std::string::npos);
+
+  Observation still = right;
+  for (SeenFrame& frame : still.frames) frame.number = 7;
+  EXPECT_TRUE(fails(checked(arm, still), "accepted", "repeated"));
+
+  Observation two_senders = right;
+  for (std::size_t k = 0; k < two_senders.frames.size(); k += 2)
+    two_senders.frames[k].number += 5000;
+  EXPECT_TRUE(any_failed(checked(arm, two_senders)));
+
+  Observation turned = right;
+  for (SeenFrame& frame : turned.frames)
+    frame.body[2].orientation =
+        frame.body[2].orientation * Eigen::AngleAxisd(1.5708, Eigen::Vector3d::UnitZ());
+  EXPECT_TRUE(any_failed(checked(arm, turned)));
+
+  Observation zero = right;
+  for_each_body(zero, [](BodyPose& body) { body.orientation.coeffs().setZero(); });
+  EXPECT_TRUE(any_failed(checked(arm, zero)));
+
+  Observation late = right;
+  for (SeenFrame& frame : late.frames) frame.capture_ns = frame.arrival_ns - 80 * test::kMs;
+  EXPECT_TRUE(fails(checked(arm, late), "accepted", "older than max_latency_s"));
+
+  Observation stale = right;
+  for (SeenFrame& frame : stale.frames) frame.body[2] = stale.frames.front().body[2];
+  EXPECT_TRUE(fails(checked(arm, stale), "accepted", "repeats an old pose"));
+}
+
 }  // namespace
 }  // namespace softarm
