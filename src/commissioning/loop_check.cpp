@@ -14,7 +14,6 @@ namespace softarm {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kLeastGainMargin = 1.25;
 
 // The blow, and the windows in which the disturbance is compared.
 constexpr double kAfterJoining_s = 1.0, kBlow_s = 0.01, kBlowPart = 0.02;
@@ -132,20 +131,22 @@ double largest_stable(double none, double most, double exactness,
   return none;
 }
 
+/// Whether the loop is stable with so many times the moments and so much more dead time.
+bool is_stable(Experiment experiment, double gain, double delay_s) {
+  scale_gain(experiment, gain);
+  experiment.plant.valves.dead_time_s += delay_s;
+  return disturbance_growth_1ps(experiment) < 0.0;
+}
+
 LoopMargins margins_of(const Experiment& experiment, const LoopFinding& found) {
   LoopMargins margins;
   margins.at = found;
   if (!(found.growth_1ps < 0.0)) return margins;
-  const auto stable = [&](double gain, double delay_s) {
-    Experiment changed = experiment;
-    scale_gain(changed, gain);
-    changed.plant.valves.dead_time_s += delay_s;
-    return disturbance_growth_1ps(changed) < 0.0;
-  };
-  margins.gain =
-      largest_stable(1.0, kLargestGainMargin, 0.05, [&](double gain) { return stable(gain, 0.0); });
-  margins.delay_s = largest_stable(0.0, kLargestDelayMargin_s, 1e-3,
-                                   [&](double delay_s) { return stable(1.0, delay_s); });
+  margins.gain = largest_stable(1.0, kLargestGainMargin, 0.05,
+                                [&](double gain) { return is_stable(experiment, gain, 0.0); });
+  margins.delay_s = largest_stable(0.0, kLargestDelayMargin_s, 1e-3, [&](double delay_s) {
+    return is_stable(experiment, 1.0, delay_s);
+  });
   return margins;
 }
 
@@ -215,7 +216,7 @@ double disturbance_growth_1ps(const Experiment& asked) {
   return std::log(late.value() / early.value()) / (kLate_s - kEarly_s);
 }
 
-LoopCheck check_loop(const Experiment& asked) {
+LoopCheck check_loop(const Experiment& asked, LoopDepth depth) {
   const Experiment declared = on_declared_arm(asked);
   LoopCheck check;
   for (const Place& place : places(declared)) {
@@ -227,7 +228,8 @@ LoopCheck check_loop(const Experiment& asked) {
       check.findings.push_back({corner.name, place.name, disturbance_growth_1ps(experiment)});
       const LoopFinding& found = check.findings.back();
       if (&corner == kCorners) {
-        keep_smallest(margins_of(experiment, found), check.configured);
+        if (depth == LoopDepth::margins)
+          keep_smallest(margins_of(experiment, found), check.configured);
         slowest = found;
         worst = experiment;
       } else if (found.growth_1ps > slowest.growth_1ps) {
@@ -235,7 +237,9 @@ LoopCheck check_loop(const Experiment& asked) {
         worst = std::move(experiment);
       }
     }
-    keep_smallest(margins_of(worst, slowest), check.worst);
+    if (depth == LoopDepth::margins) keep_smallest(margins_of(worst, slowest), check.worst);
+    if (slowest.growth_1ps < 0.0 && !is_stable(worst, kLeastGainMargin, 0.0))
+      check.close.push_back(slowest);
   }
   return check;
 }
@@ -252,10 +256,10 @@ std::vector<std::string> loop_warnings(const LoopCheck& check) {
             : fmt::format("the loop does not stay ACTIVE on the arm {}, {}", finding.arm,
                           finding.where));
   }
-  if (out.empty() && check.worst.gain < kLeastGainMargin) {
-    out.push_back(fmt::format("the loop is close to unstable on the arm {}, {}: gain margin {:.2f}",
-                              check.worst.at.arm, check.worst.at.where, check.worst.gain));
-  }
+  for (const LoopFinding& finding : check.close)
+    out.push_back(
+        fmt::format("the loop is close to unstable on the arm {}, {}: gain margin below {}",
+                    finding.arm, finding.where, kLeastGainMargin));
   return out;
 }
 

@@ -80,7 +80,7 @@ void TaskSpaceTracker::start(double time_s, ConstVectorRef u, ConstVectorRef vel
 
 void TaskSpaceTracker::measure(double time_s, const Eigen::Vector3d& tip_m) noexcept {
   const double back = time_s - time_s_;
-  posture_ = u_ + back * velocity_ + 0.5 * back * back * acceleration_;
+  posture_ = u_ + back * (velocity_ + back * (0.5 * acceleration_ + back / 6.0 * jerk_));
   offset_.measure(time_s, tip_m - tip_position(arm_, posture_),
                   from_base(target(time_s)).position_m);
 }

@@ -222,14 +222,17 @@ void DaemonLink::take_go(const ReceivedMessage& packet) noexcept {
 }
 
 void DaemonLink::take_command(const ReceivedMessage& packet) noexcept {
-  const auto take = [&](auto& message) {
-    if (!decode(packet.bytes, message)) {
+  // What no valve would take is no command.
+  const auto take = [&](auto& message, const auto& values) {
+    if (!decode(packet.bytes, message) || std::ssize(values) != measured_bar_.size() ||
+        !std::all_of(values.begin(), values.end(), [](auto each) { return std::isfinite(each); })) {
       ++malformed_;
     } else if (message.shadow == 0 && !sent_.contains(message.sequence, message.time_us)) {
       newest_foreign_ns_ = arrival_ns(packet);
     }
   };
-  messages_.by_torque() ? take(heard_torques_) : take(heard_pressures_);
+  messages_.by_torque() ? take(heard_torques_, heard_torques_.torque_nm)
+                        : take(heard_pressures_, heard_pressures_.pressure_bar);
 }
 
 void DaemonLink::publish_command(std::int64_t now_ns, const TickOutput& output) noexcept {

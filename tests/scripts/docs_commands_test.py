@@ -71,8 +71,8 @@ SLOW = {
     "softarm identify config/paper_simulation.yaml --linear --no-lag --no-delay",
     "build/python/bin/python examples/follow.py --duration 12",
 }
-# What a busy machine may make of them: a check of the timing fails.
-MAY_END_WITH_1 = {
+# What a busy machine may make of them: a check of the timing fails (1). Without a pulse not everything is checked (3).
+MAY_FAIL_OR_NOT_CHECK = {
     "softarm check --live config/paper_arm.yaml --seconds 2",
     "softarm check --live config/one_segment.yaml --seconds 2 --pulse --hold 0.45",  # fails as documented
 }
@@ -271,7 +271,7 @@ def has_own_networks():
 def run_page(page, printed):
     """Exit code, seconds, and what the page's commands print."""
     lines = ["set -euo pipefail"]
-    lines += [each.key + " || [[ $? == 1 ]]" if each.key in MAY_END_WITH_1 else each.text for each in printed]
+    lines += [each.key + " || [[ $? == [13] ]]" if each.key in MAY_FAIL_OR_NOT_CHECK else each.text for each in printed]
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
         for part in ("config", "tools", "tests", "examples", "lcmtypes"):
@@ -311,7 +311,7 @@ class Commands(unittest.TestCase):
 
     def test_exceptions_are_commands_of_a_page(self):
         printed = {command.key for page in pages() for block in blocks(page) for command in block}
-        self.assertEqual({*NOT_RUN, *SLOW, *MAY_END_WITH_1} - printed, set())
+        self.assertEqual({*NOT_RUN, *SLOW, *MAY_FAIL_OR_NOT_CHECK} - printed, set())
 
     def test_what_does_not_exist_is_noticed(self):
         for line in ("softarm no_such_command", "softarm run --no-such-option config/paper_arm.yaml", "softarmx", "tools/no_such_script",

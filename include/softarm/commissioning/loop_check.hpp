@@ -18,7 +18,7 @@ struct LoopFinding {
 /// How far a loop is from unstable, wherever it was judged: straight and in every phase, each on the
 /// arm on which a disturbance fades slowest.
 struct LoopMargins {
-  LoopFinding at;        ///< where the gain margin is smallest
+  LoopFinding at;        ///< where the gain margin is smallest; no arm: margins were not asked for
   double gain = 0.0;     ///< largest factor on the moments of all chambers; 0: unstable as it is
   double delay_s = 0.0;  ///< largest additional dead time
 };
@@ -28,7 +28,17 @@ struct LoopCheck {
   std::vector<LoopFinding> findings;
   LoopMargins configured;  ///< on the configured arm
   LoopMargins worst;       ///< on all
+  /// Stable, but not with kLeastGainMargin times the moments.
+  std::vector<LoopFinding> close;
 };
+
+/// What is looked for.
+enum class LoopDepth {
+  stability,  ///< which loops are unstable, or close to it
+  margins     ///< by how much they are not, too: some ten times the work
+};
+
+inline constexpr double kLeastGainMargin = 1.25;
 
 inline constexpr double kLargestGainMargin = 4.0;      ///< more is not looked for
 inline constexpr double kLargestDelayMargin_s = 0.05;  ///< likewise
@@ -44,9 +54,10 @@ double disturbance_growth_1ps(const Experiment& experiment);
 Experiment on_declared_arm(Experiment experiment);
 
 /// Judges the configured arm, and the arms at the edges of arm.uncertainty, held straight and along
-/// every phase of the reference (at most six; a live one: straight; polar gains: not straight). Simulates some minutes: seconds of
-/// processor time for three segments.
-LoopCheck check_loop(const Experiment& experiment);
+/// every phase of the reference (at most six; a live one: straight; polar gains: not straight).
+/// Simulates: for three segments less than a second of processor time a place for the stability,
+/// some seconds for the margins.
+LoopCheck check_loop(const Experiment& experiment, LoopDepth depth = LoopDepth::margins);
 
 /// Texts for a person, none if all is well: unstable, or a gain margin below 1.25.
 std::vector<std::string> loop_warnings(const LoopCheck& check);

@@ -18,12 +18,19 @@ struct CheckOptions {
   std::string file;
   bool print_template = false;
   bool print_schema = false;
+  bool loop = true;
+  bool margins = false;
   bool live = false;
   LiveCheckOptions live_check;
 };
 
+/// The loop of an arm of more segments is simulated where that is asked for: it takes longer than a
+/// check should.
+constexpr int kMostSimulated = 6;
+
 /// Margins of the loop, as a comment below the configuration.
 void print_margins(const LoopMargins& margins) {
+  if (margins.at.arm.empty()) return;
   fmt::print("# loop, on the arm {}, {}: ", margins.at.arm, margins.at.where);
   if (!(margins.at.growth_1ps < 0.0)) {
     fmt::print("unstable\n");
@@ -45,12 +52,17 @@ int check(const CheckOptions& options) {
     say(fmt::format("{}: warning: {}\n", options.file, warning));
   }
   if (options.live) return check_live(experiment, options.live_check);
-  const LoopCheck loop = check_loop(experiment);
+  LoopCheck loop;
+  const bool simulated =
+      options.margins || (options.loop && experiment.arm.size() <= kMostSimulated);
+  if (simulated)
+    loop = check_loop(experiment, options.margins ? LoopDepth::margins : LoopDepth::stability);
   for (const std::string& warning : loop_warnings(loop))
-    fmt::print(stderr, "{}: warning: {}\n", options.file, warning);
+    say(fmt::format("{}: warning: {}\n", options.file, warning));
   fmt::print("# {}, configuration {}\n{}", options.file, hash_text(experiment.hash),
              resolved_text(experiment));
   for (const std::string& line : reaction_times(experiment)) fmt::print("# {}\n", line);
+  if (!simulated) fmt::print("# loop: not simulated; softarm check --margins does\n");
   print_margins(loop.configured);
   print_margins(loop.worst);
   return kExitOk;
@@ -98,6 +110,14 @@ void add_check_command(CLI::App& app) {
                   "print a configuration that documents every key instead");
   group->add_flag("--schema", options->print_schema,
                   "print a JSON Schema instead, by which editors complete and check an experiment");
+  CLI::Option* margins = command->add_flag(
+      "--margins", options->margins,
+      "also how far the loop is from unstable: gain and delay margin, some seconds of simulation");
+  command
+      ->add_flag(
+          "!--no-loop", options->loop,
+          "do not simulate the loop (as for more than 6 segments), which takes about a second")
+      ->excludes(margins);
   add_live_options(*command, *options);
   command->callback([options] {
     if (const int code = check(*options); code != kExitOk) throw CLI::RuntimeError(code);

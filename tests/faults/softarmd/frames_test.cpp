@@ -172,6 +172,8 @@ TEST_P(FrameFaults, FrozenPosesHoldAndARestartedSenderVents) {
   forget();
   plant_process_.reset();
   EXPECT_TRUE(becomes(*this, Mode::vent, Reason::frames_stale)) << seen_text();
+  // New valves report that they hold nothing, and commands then begin at zero at once.
+  ASSERT_TRUE(wait_for([&] { return largest(command_.pressure_bar) == 0.0F; }));
   plant_process_ = start_plant(*this, kSensorSuffix);
   recovers();
   expect_limits(*this);

@@ -52,7 +52,7 @@ TEST_P(HostileBytes, MalformedPacketsWithoutEndAreRefusedWhileTheArmIsControlled
   const char* wanted = std::getenv("SOFTARM_HOSTILE_PACKETS");
   const long packets = wanted != nullptr ? std::atol(wanted) : 10'000;
   lcm_ = ", deadman_channel: GO";
-  validity_s_ = 1.0;
+  validity_s_ = 0.5;
   // Thresholds that no machine reaches by being busy: whatever is seen, the packets have done.
   write_config("paper_arm.yaml",
                "  safety: {hold_after_s: 1, vent_after_s: 2, deadman_timeout_s: 2, "

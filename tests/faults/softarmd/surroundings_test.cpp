@@ -16,9 +16,9 @@ TEST_P(Surroundings, AWallClockThatIsSetDisturbsNothing) {
   GTEST_SKIP() << "a sanitizer's runtime must be loaded first";
 #endif
   // Thresholds that no machine reaches by being busy, and every step of the clock does.
-  validity_s_ = 1.0;
+  validity_s_ = 0.5;
   write_config("paper_arm.yaml",
-               "  safety: {hold_after_s: 1, vent_after_s: 2, max_latency_s: 1, good_frames: 20}\n" +
+               "  safety: {hold_after_s: 1, vent_after_s: 2, max_latency_s: 0.5, good_frames: 20}\n" +
                    realtime());
   test::PreloadedClocks clock((folder_ / "wall_clock").string());
   ASSERT_TRUE(clock.made());

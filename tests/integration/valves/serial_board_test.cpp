@@ -18,7 +18,8 @@ using Answer = PressureBoard::Answer;
 class SerialBoard : public test::ValvesProgram {
  protected:
   void begin() {
-    configure(1, ", backend: serial_board, device: " + board_.device());
+    // At a board that may be real, arming is explicit unless the file has it otherwise.
+    configure(1, ", backend: serial_board, device: " + board_.device(), ", arming: automatic");
     driver_ = start("example_serial_pressure_board");
   }
   bool board_has(double bar) const {

@@ -128,7 +128,7 @@ std::vector<SampleMessage> sample_messages(const LcmSettings& lcm, int segments,
   pressure_measurement_t measured{};
   measured.num_chambers = static_cast<std::int16_t>(chambers);
   measured.pressure_bar.resize(static_cast<std::size_t>(chambers));
-  add(lcm.measurement_channel, measured, kHash + 16, 4);
+  add(lcm.measurement_channel, measured, kHash + 25, 4);
   pressure_command_t command{};
   command.num_chambers = measured.num_chambers;
   command.pressure_bar = measured.pressure_bar;
