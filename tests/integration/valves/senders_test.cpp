@@ -85,7 +85,8 @@ TEST_P(Senders, OnePacketOfAnotherProgramMovesNothingBeyondTheSlewAndVents) {
 }
 
 TEST_P(Senders, TwoProgramsAtOnceHaveNoPressureAndNoneWhenOneLeaves) {
-  ASSERT_TRUE(command_until(0.0, [&] { return measured_.sequence >= 0; })) << valves_->printed();
+  ASSERT_TRUE(command_until(0.0, [&] { return measurements_ > 0 && measured_.sequence >= 0; }))
+      << valves_->printed();
   ASSERT_TRUE(command_until(0.3, [&] {
     intrude(0.8);
     return saw_other_sender_;
