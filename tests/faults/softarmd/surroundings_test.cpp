@@ -17,9 +17,10 @@ TEST_P(Surroundings, AWallClockThatIsSetDisturbsNothing) {
 #endif
   // Thresholds that no machine reaches by being busy, and every step of the clock does.
   validity_s_ = 0.5;
-  write_config("paper_arm.yaml",
-               "  safety: {hold_after_s: 1, vent_after_s: 2, max_latency_s: 0.5, good_frames: 20}\n" +
-                   realtime());
+  write_config(
+      "paper_arm.yaml",
+      "  safety: {hold_after_s: 1, vent_after_s: 2, max_latency_s: 0.5, good_frames: 20}\n" +
+          realtime());
   test::PreloadedClocks clock((folder_ / "wall_clock").string());
   ASSERT_TRUE(clock.made());
   const auto plant = start_plant(*this);
