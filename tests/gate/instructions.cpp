@@ -1,14 +1,11 @@
 // Runs the key functions under callgrind: each over its random states once, between a reset of the
-// counters and a dump that carries its name and the number of calls; with `--ticks` the
-// worst ticks, one a dump; `--time` measures those by the clock.
+// counters and a dump that carries its name and the number of calls.
 #include <fmt/format.h>
 #include <valgrind/callgrind.h>
 
 #include <cstdio>
-#include <string_view>
 
 #include "dev/bench/methods.hpp"
-#include "gate/ticks.hpp"
 
 namespace softarm {
 namespace {
@@ -34,15 +31,7 @@ void count(const Method& method, int segments) {
 }  // namespace
 }  // namespace softarm
 
-int main(int argc, char** argv) {
-  if (argc == 2 && std::string_view(argv[1]) == "--ticks") {
-    softarm::count_ticks();
-    return 0;
-  }
-  if (argc == 2 && std::string_view(argv[1]) == "--time") {
-    softarm::time_ticks();
-    return 0;
-  }
+int main() {
   using softarm::Method, softarm::Route, softarm::MassModel;
   for (const MassModel mass : {MassModel::point, MassModel::distributed}) {
     for (const int segments : {3, 10}) {

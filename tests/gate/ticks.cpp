@@ -1,5 +1,6 @@
-#include "gate/ticks.hpp"
-
+// The worst ticks of the control pipeline, each scene for arms of several sizes:
+//   gate_ticks          times them
+//   gate_ticks --count  under callgrind: dumps the counters after every tick
 #include <fmt/format.h>
 #include <valgrind/callgrind.h>
 
@@ -8,6 +9,7 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "softarm/base/clock.hpp"
@@ -124,8 +126,7 @@ void play(const std::function<void(const std::string& name, const std::function<
   }
 }
 
-}  // namespace
-
+/// Dumps the counters after every tick, labelled tick.OBSERVER.SCENE.n.
 void count_ticks() {
   play([](const std::string& name, const std::function<void()>& tick) {
     const std::string label = name + " 1";
@@ -135,6 +136,7 @@ void count_ticks() {
   });
 }
 
+/// Prints the median and the slowest tick of every scene, us.
 void time_ticks() {
   std::vector<std::pair<std::string, std::vector<double>>> times;
   for (int k = 0; k < 5; ++k) {
@@ -155,4 +157,13 @@ void time_ticks() {
   }
 }
 
+}  // namespace
 }  // namespace softarm
+
+int main(int argc, char** argv) {
+  if (argc == 2 && std::string_view(argv[1]) == "--count") {
+    softarm::count_ticks();
+  } else {
+    softarm::time_ticks();
+  }
+}
