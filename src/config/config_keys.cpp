@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <charconv>
 #include <cmath>
 #include <numbers>
 #include <numeric>
@@ -11,21 +10,13 @@
 #include <utility>
 
 #include "config/hints.hpp"
+#include "config/parsed_number.hpp"
 #include "config/yaml_tree.hpp"
 
 namespace softarm {
 namespace {
 
 constexpr std::size_t kLongestList = 256;
-
-/// All of the text as a number.
-template <typename T>
-std::optional<double> parsed(std::string_view text) {
-  T value{};
-  const auto [end, code] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (code != std::errc() || end != text.data() + text.size() || text.empty()) return {};
-  return static_cast<double>(value);
-}
 
 /// An angle as people write it: "pi", "-pi/2", "3*pi/4", "0.2*pi/180".
 std::optional<double> multiple_of_pi(std::string_view text) {

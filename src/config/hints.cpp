@@ -10,6 +10,8 @@
 #include <limits>
 #include <vector>
 
+#include "config/parsed_number.hpp"
+
 namespace softarm {
 namespace {
 
@@ -90,14 +92,6 @@ std::string_view last_name(std::string_view path) {
 std::string_view section_of(std::string_view path) {
   const auto cut = path.rfind('.');
   return cut == std::string_view::npos ? std::string_view() : path.substr(0, cut);
-}
-
-template <typename T>
-std::optional<double> parsed(std::string_view text) {
-  T value{};
-  const auto [end, code] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (code != std::errc() || end != text.data() + text.size() || text.empty()) return {};
-  return static_cast<double>(value);
 }
 
 bool zeros_in_front(std::string_view text) {

@@ -45,10 +45,11 @@ struct Cause {
 };
 
 /// Every cause, the most severe first: an emergency stop, `shutdown` because it is final, then by
-/// the mode they demand, then by what clears them: of two causes at once the stricter clearance must
-/// not be forgotten. Valves that are silent or do not follow are a fault where there is pressure; where there
-/// is none they only keep the arm from becoming active, so that valves may be switched on after the
-/// daemon. So is an arm of another length, whose marker frames may still be put right. Overruns are ticks missed in a row, and judged only under SCHED_FIFO
+/// the mode they demand, then by what clears them: of two causes at once the stricter clearance
+/// must not be forgotten. Valves that are silent or do not follow are a fault where there is
+/// pressure; where there is none they only keep the arm from becoming active, so that valves may be
+/// switched on after the daemon. So is an arm of another length, whose marker frames may still be
+/// put right. Overruns are ticks missed in a row, and judged only under SCHED_FIFO
 /// (consecutive_overruns is zero otherwise): without it they are only counted.
 constexpr std::array kCauses{
     Cause{{Reason::emergency_stop, Mode::fault, Clearance::disarm_then_arm},
