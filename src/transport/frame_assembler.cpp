@@ -1,10 +1,17 @@
 #include "softarm/transport/frame_assembler.hpp"
 
-#include <cmath>
+#include <cstdlib>
 
 #include "softarm/base/time.hpp"
 
 namespace softarm {
+namespace {
+
+bool same_pose(const BodyPose& a, const BodyPose& b) noexcept {
+  return a.position_m == b.position_m && a.orientation.coeffs() == b.orientation.coeffs();
+}
+
+}  // namespace
 
 FrameAssembler::FrameAssembler(int segments, bool fixed_base, double frame_period_s) noexcept
     : bodies_(static_cast<std::size_t>(segments) + 1),
@@ -45,8 +52,17 @@ FrameAssembler::Outcome FrameAssembler::add(std::size_t body, const BodyPose& po
   if (!begun_) return begin(body, pose, stamp_us, arrival_ns);
   const Body& known = current_.body[body];
   const std::int64_t later_ns = 1000 * (stamp_us - current_.stamp_us);
+  if (std::abs(later_ns) < half_period_ns_ && arrival_ns - current_.arrival_ns >= half_period_ns_) {
+    const bool moved = known.seen && stamp_us == known.stamp_us && !same_pose(pose, known.pose);
+    if (moved || clock_.coarse()) {
+      clock_.count(true);
+      old_in_row_ = 0;
+      return begin(body, pose, stamp_us, arrival_ns);
+    }
+  }
   const bool newer = later_ns >= half_period_ns_ || (known.seen && stamp_us > known.stamp_us);
   if (newer) {
+    clock_.count(false);
     old_in_row_ = 0;
     return begin(body, pose, stamp_us, arrival_ns);
   }

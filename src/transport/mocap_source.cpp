@@ -9,9 +9,6 @@
 namespace softarm {
 namespace {
 
-/// A clock that repeats itself from frame to frame is coarse: so many of a weight of four a
-/// repetition, which every frame with a new stamp lowers by one.
-constexpr int kCoarse = 16, kCoarsest = 64, kRepetition = 4;
 constexpr std::int64_t kNonsense_us = kLatest_us + 1;  // no clock relation takes it
 
 }  // namespace
@@ -51,13 +48,13 @@ MocapReceipt MocapSource::take(std::size_t channel, std::span<const std::byte> b
   const std::int64_t stamp_us =
       is_time_us(sent_->sender_time_us) ? sent_->sender_time_us : kNonsense_us;
   if (sent_->frame_number != frame_number_) {
-    const bool repeats = stamp_us == sender_time_us_;
-    coarse_ = std::clamp(coarse_ + (repeats ? kRepetition : -1), 0, kCoarsest);
+    sender_clock_.count(stamp_us == sender_time_us_);
     frame_number_ = sent_->frame_number;
   }
   sender_time_us_ = stamp_us;
   // Several frames with one stamp would be captured at once: the arrival is the better time.
-  frame.capture_ns = clock_.capture_ns(arrival_ns, coarse_ < kCoarse ? stamp_us : kNonsense_us);
+  frame.capture_ns =
+      clock_.capture_ns(arrival_ns, sender_clock_.coarse() ? kNonsense_us : stamp_us);
   return MocapReceipt::frame;
 }
 
@@ -70,7 +67,8 @@ MocapReceipt MocapSource::take_body(std::size_t channel, std::int64_t arrival_ns
   const auto outcome =
       assembler_.add(body, adapter_.to_pose(sent_->body[0], body), stamp_us, arrival_ns);
   if (outcome == FrameAssembler::Outcome::begun)
-    assembler_.set_capture_ns(clock_.capture_ns(arrival_ns, stamp_us));
+    assembler_.set_capture_ns(
+        clock_.capture_ns(arrival_ns, assembler_.coarse_clock() ? kNonsense_us : stamp_us));
   adapter_.clear(frame);
   if (!assembler_.take_done(frame)) return MocapReceipt::nothing;
   sender_time_us_ = stamp_us;

@@ -5,13 +5,16 @@
 #include <cstdint>
 
 #include "softarm/estimation/mocap_frame.hpp"
+#include "softarm/transport/coarse_clock.hpp"
 
 namespace softarm {
 
 /// Bodies whose stamps are less than half a frame period from that of the first one belong to one
 /// frame. A frame is complete when all bodies have arrived; it is also closed when a body of a
 /// later frame arrives, or half a frame period after its first body arrived: missing bodies then
-/// count as not seen. Bodies of a closed or older frame are dropped. Twice as many older bodies
+/// count as not seen. Bodies of a closed or older frame are dropped. A body that comes again with
+/// its old stamp but moved, half a frame period after the frame began, is of the next frame: the
+/// sender's clock is coarser than its frames, and arrivals separate them. Twice as many older bodies
 /// in a row as a frame has mean that the sender's clock was set back: assembly then starts again.
 /// Frames are numbered from 1, because the sender does not number them. Allocates nothing.
 class FrameAssembler {
@@ -35,6 +38,9 @@ class FrameAssembler {
   /// Moves bodies, number and capture time of the closed frame to `frame`; a fixed base is left
   /// unchanged. False if no frame is closed.
   bool take_done(MocapFrame& frame) noexcept;
+
+  /// Stamps repeat from frame to frame: they are no times of capture.
+  bool coarse_clock() const noexcept { return clock_.coarse(); }
 
   /// Closes the current frame if its first body arrived at least half a frame period before
   /// `now_ns`.
@@ -62,6 +68,7 @@ class FrameAssembler {
   std::size_t bodies_;  // base included
   std::size_t first_;   // 1 where the base is fixed
   std::int64_t half_period_ns_;
+  CoarseClock clock_;
   Frame current_;  // being assembled, or the last one
   Frame done_;
   bool begun_ = false;

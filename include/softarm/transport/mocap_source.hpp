@@ -65,7 +65,7 @@ class MocapSource {
   FrameAssembler assembler_;
   std::int64_t sender_time_us_ = 0;
   std::int64_t frame_number_ = 0;
-  int coarse_ = 0;  ///< how often stamps repeat: a clock of 15.6 ms grain, or one that stands still
+  CoarseClock sender_clock_;  ///< of whole frames; the assembler has that of single bodies
   std::unique_ptr<MocapFormat> format_;
   std::unique_ptr<SentFrame> sent_;
 };

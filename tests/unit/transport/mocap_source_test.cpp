@@ -111,6 +111,44 @@ TEST(MocapSource, WhereStampsRepeatArrivalsCount) {
   }
 }
 
+/// The same where bodies come one by one: no frame is lost, and none mixes bodies of two frames,
+/// whether the base moves at all and although now and then a body is lost.
+TEST(MocapSource, WhereStampsOfBodiesRepeatArrivalsSeparateFrames) {
+  for (const bool base_moves : {true, false}) {
+    std::mt19937 random(3);
+    SafetySettings safety;
+    safety.frame_latency_s = 0.002;
+    TransportSettings transport = foreign("rigid_transform", random);
+    transport.bodies.base_marker_frame = {};
+    transport.bodies.segment_marker_frames = {{}, {}};
+    MocapSource source(transport, safety, two_segments());
+    MocapFrame frame;
+    int frames = 0, whole = 0;
+    for (std::int64_t k = 0; k < 400; ++k) {
+      const std::int64_t arrival_ns = 1'000'000'000 + 5'000'000 * k;
+      for (std::size_t body = 0; body < 3; ++body) {
+        if (k % 50 == 30 && body == static_cast<std::size_t>(k / 50 % 3)) continue;  // lost
+        rigid_transform_t message{};
+        message.utime = 5000 * k / 15'625 * 15'625;
+        message.quat[3] = 1.0;
+        message.trans[0] = body > 0 || base_moves ? static_cast<double>(k) : 0.0;
+        if (source.take(body, encoded(message), arrival_ns, frame) != MocapReceipt::frame) continue;
+        ++frames;
+        if (k < 20) continue;
+        whole += frame.body[0].valid && frame.body[1].valid && frame.body[2].valid ? 1 : 0;
+        EXPECT_EQ(frame.capture_ns, arrival_ns - 2'000'000) << k;
+        for (std::size_t i = base_moves ? 0 : 1; i < 3; ++i) {
+          if (!frame.body[i].valid) continue;
+          EXPECT_NEAR(frame.body[i].position_m.norm(), 1e-3 * static_cast<double>(k), 1e-9) << i;
+        }
+      }
+      if (source.overdue(arrival_ns + 3'000'000, frame)) ++frames;
+    }
+    EXPECT_GE(frames, 390);
+    EXPECT_EQ(whole, 380 - 8);
+  }
+}
+
 /// A packet that comes twice is no sign of a coarse clock.
 TEST(MocapSource, WherePacketsRepeatStampsCount) {
   std::mt19937 random(3);
