@@ -16,7 +16,7 @@ namespace {
 /// Every route must be exact, or its time is no achievement. The augmented robot's small-theta rows
 /// and KDL's long levers lose a digit or two; none more.
 TEST(BenchMethods, EveryRouteIsExact) {
-  constexpr double kTolerance = 1e-13;
+  constexpr double kRouteTolerance = 1e-13;
   const std::string golden = std::string(SOFTARM_SOURCE_DIR) + "/tests/golden/golden.json";
   for (const MassModel mass : {MassModel::point, MassModel::distributed}) {
     const auto known = golden_states(golden, mass);
@@ -27,8 +27,8 @@ TEST(BenchMethods, EveryRouteIsExact) {
           std::string(name(method.route)) + ", " + coordinates(method) + ", " + name(mass);
       const LargestError at_golden = largest_error(method, known),
                          at_sweep = largest_error(method, method.polar ? sweep_polar : sweep_u);
-      EXPECT_LE(at_golden.relative, kTolerance) << label;
-      EXPECT_LE(at_sweep.relative, kTolerance) << label;
+      EXPECT_LE(at_golden.relative, kRouteTolerance) << label;
+      EXPECT_LE(at_sweep.relative, kRouteTolerance) << label;
       EXPECT_GT(at_sweep.states, 20) << label;
       // The file has no distributed mass in polar coordinates.
       EXPECT_EQ(at_golden.states > 0, !(method.polar && mass == MassModel::distributed)) << label;

@@ -38,4 +38,12 @@ inline Outcome balanced_run(PlantSettings settings, const std::vector<double>& p
   return result;
 }
 
+inline PlantSettings with_damping(PlantSettings settings, double factor) {
+  for (SegmentParameters& segment : settings.arm.segments) {
+    segment.damping_nms_per_rad *= factor;
+    segment.axial_damping_ns_per_m *= factor;
+  }
+  return settings;
+}
+
 }  // namespace softarm

@@ -34,14 +34,6 @@ PlantSettings released(double bend_rad, MassModel mass, int segments = 3) {
   return settings;
 }
 
-PlantSettings with_damping(PlantSettings settings, double factor) {
-  for (SegmentParameters& segment : settings.arm.segments) {
-    segment.damping_nms_per_rad *= factor;
-    segment.axial_damping_ns_per_m *= factor;
-  }
-  return settings;
-}
-
 std::vector<double> one_side(double pressure_bar, int segments) {
   std::vector<double> pressures(static_cast<std::size_t>(4 * segments), 0.0);
   for (std::size_t i = 0; i < pressures.size(); i += 4) pressures[i] = pressure_bar;

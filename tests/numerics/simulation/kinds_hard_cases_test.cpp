@@ -45,11 +45,6 @@ PlantSettings with_dead_time(PlantSettings settings) {
   return settings;
 }
 
-PlantSettings with_damping(PlantSettings settings, double factor) {
-  for (SegmentParameters& segment : settings.arm.segments) segment.damping_nms_per_rad *= factor;
-  return settings;
-}
-
 /// One segment with a moment that bends it beyond pi.
 PlantSettings by_torque(MakeKind kind, int parts) {
   PlantSettings settings = arm_of(kind, 1, parts);
@@ -74,7 +69,7 @@ std::vector<double> one_side(int segments) {
   return pressures;
 }
 
-std::vector<KindCase> cases() {
+std::vector<KindCase> kind_cases() {
   return {
       {"refined_release_from_2_rad", arm_of(kRefined, 3, 4, 2.0), 0.3, {}},
       {"links_release_from_2_rad", arm_of(kLinks, 3, 6, 2.0), 0.3, {}},
@@ -122,7 +117,7 @@ TEST_P(KindsHardCases, AgreeWithATightRunAndBalanceTheirEnergies) {
   EXPECT_EQ(tight.counters.retries, 0);
 }
 
-INSTANTIATE_TEST_SUITE_P(Plant, KindsHardCases, ::testing::ValuesIn(cases()),
+INSTANTIATE_TEST_SUITE_P(Plant, KindsHardCases, ::testing::ValuesIn(kind_cases()),
                          [](const auto& example) { return std::string(example.param.name); });
 
 TEST(LinksPlant, AreDrivenThroughPiWithoutNoticing) {

@@ -8,6 +8,7 @@
 #include <random>
 #include <vector>
 
+#include "milliseconds.hpp"
 #include "softarm/actuation/command_expiry.hpp"
 #include "softarm/actuation/pressure_ramps.hpp"
 #include "softarm/runtime/safety_monitor.hpp"
@@ -16,7 +17,7 @@
 namespace softarm {
 namespace {
 
-constexpr std::int64_t kMs = 1'000'000;
+using test::kMs;
 constexpr std::int64_t kTick = 10 * kMs, kValidity = 100 * kMs, kFailsafe = 200 * kMs;
 constexpr double kTick_s = 0.01, kFull_bar = 2.0, kVent_bar_per_s = 8.0;
 /// The daemon's own ramp to zero, with a stop in it that is shorter than the validity.

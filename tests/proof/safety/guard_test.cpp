@@ -12,6 +12,7 @@
 #include <unordered_set>
 #include <vector>
 
+#include "milliseconds.hpp"
 #include "softarm/valves/valve_guard.hpp"
 
 namespace softarm {
@@ -80,7 +81,7 @@ struct ProofOfGuard {
 
 namespace {
 
-constexpr std::int64_t kMs = 1'000'000;
+using test::kMs;
 constexpr std::int64_t kEpoch = 1'000'000'000'000;
 constexpr std::int64_t kPeriod = 500 * kMs, kFailsafe = 1500 * kMs, kValidity = 1000 * kMs;
 constexpr double kFull_bar = 2.0, kRise_bar_per_s = 2.0;

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "milliseconds.hpp"
 #include "proof/safety/explorer.hpp"
 #include "softarm/runtime/safety_monitor.hpp"
 
@@ -18,7 +19,7 @@ namespace {
 
 using proof::kEpoch_ns;
 
-constexpr std::int64_t kMs = 1'000'000;
+using test::kMs;
 constexpr double kPeriod_s = 0.125;  // an `arm` lapses after 2.5 s with it
 /// All times are multiples of this, so that ages take few values, each threshold itself among them.
 constexpr std::int64_t kStep = 500 * kMs;

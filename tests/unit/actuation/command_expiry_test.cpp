@@ -6,10 +6,12 @@
 #include <limits>
 #include <stdexcept>
 
+#include "milliseconds.hpp"
+
 namespace softarm {
 namespace {
 
-constexpr std::int64_t kMs = 1'000'000;
+using test::kMs;
 
 class Expiry : public ::testing::Test {
  protected:

@@ -2,10 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include "milliseconds.hpp"
+
 namespace softarm {
 namespace {
 
-constexpr std::int64_t kMs = 1'000'000;
+using test::kMs;
 
 TEST(KeyHold, OneKeyLastsUntilARepeatWouldHaveCome) {
   KeyHold hold;

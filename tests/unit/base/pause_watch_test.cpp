@@ -2,13 +2,14 @@
 
 #include <thread>
 
+#include "milliseconds.hpp"
 #include "softarm/base/clock.hpp"
 #include "suspended_clock.hpp"
 
 namespace softarm {
 namespace {
 
-constexpr std::int64_t kMs = 1'000'000;
+using test::kMs;
 
 TEST(PauseWatch, ReportsASuspendOnce) {
 #ifndef SOFTARM_SETS_CLOCK

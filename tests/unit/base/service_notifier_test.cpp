@@ -6,6 +6,7 @@
 #include <string>
 
 #include "counted_malloc.hpp"
+#include "milliseconds.hpp"
 #include "notify_socket.hpp"
 
 namespace softarm {
@@ -14,7 +15,7 @@ namespace {
 using test::AddressKind;
 using test::NotifySocket;
 
-constexpr std::int64_t kMs = 1'000'000;
+using test::kMs;
 constexpr std::int64_t kStart_ns = 1'000'000 * kMs;
 
 class Notifier : public ::testing::TestWithParam<AddressKind> {

@@ -3,13 +3,14 @@
 
 #include <gtest/gtest.h>
 
+#include "milliseconds.hpp"
 #include "softarm/config/load.hpp"
 #include "unit/client/arcs.hpp"
 
 namespace softarm {
 namespace {
 
-constexpr std::int64_t kMs = 1'000'000;
+using test::kMs;
 
 class Sight : public ::testing::Test {
  protected:

@@ -8,12 +8,13 @@
 #include <limits>
 #include <random>
 
+#include "milliseconds.hpp"
 #include "softarm/base/time.hpp"
 
 namespace softarm {
 namespace {
 
-constexpr std::int64_t kMs = 1'000'000;
+using test::kMs;
 constexpr double kValidity_s = 0.1;
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInf = std::numeric_limits<double>::infinity();

@@ -1,6 +1,7 @@
 // Commands of a client as the valves hear them, on a clock that the test sets.
 #include <cmath>
 
+#include "milliseconds.hpp"
 #include "softarm/base/instance_lock.hpp"
 #include "suspended_clock.hpp"
 #include "unit/client/client_test.hpp"
@@ -10,7 +11,7 @@ namespace {
 
 using namespace softarm_messages;
 
-constexpr std::int64_t kMs = 1'000'000;
+using test::kMs;
 
 class Commanding : public test::ClientTest {
  protected:

@@ -3,6 +3,7 @@
 
 #include <functional>
 
+#include "milliseconds.hpp"
 #include "softarm/transport/mocap_source.hpp"
 #include "unit/client/arcs.hpp"
 #include "unit/client/client_test.hpp"
@@ -12,7 +13,7 @@ namespace {
 
 using namespace softarm_messages;
 
-constexpr std::int64_t kMs = 1'000'000;
+using test::kMs;
 constexpr std::int64_t kLost_ns = 5000 * kMs;
 
 class Guarded : public test::ClientTest {

@@ -8,7 +8,7 @@
 namespace softarm {
 namespace {
 
-constexpr const char* kArm = R"(name: links
+constexpr const char* kArmOfLinks = R"(name: links
 arm: {segments: 2, length_m: 0.25, mass_kg: 0.25, stiffness_nm_per_rad: 2, damping_nms_per_rad: 0.5}
 actuation: {kind: torque, max_torque_nm: 20}
 control: {kp_nm_per_rad: 1}
@@ -29,7 +29,8 @@ constexpr const char* kPlant = R"(plant:
 
 TEST(PlantKeys, AreReadAndWhatIsPrintedReadsTheSame) {
   const TestFolder folder;
-  const Experiment first = load_experiment(folder.write("a.yaml", std::string(kArm) + kPlant));
+  const Experiment first =
+      load_experiment(folder.write("a.yaml", std::string(kArmOfLinks) + kPlant));
   const PlantSettings& plant = first.plant;
   EXPECT_EQ(first.actuation.kind, ActuationKind::torque);
   EXPECT_EQ(plant.actuation.kind, ActuationKind::torque);
@@ -54,7 +55,7 @@ TEST(PlantKeys, TorqueIsForSimulatedArmsAlone) {
   const TestFolder folder;
   const auto refuses = [&](const std::string& more, const std::string& key) {
     try {
-      load_experiment(folder.write("bad.yaml", kArm + more));
+      load_experiment(folder.write("bad.yaml", kArmOfLinks + more));
       ADD_FAILURE() << more << " was accepted";
     } catch (const ConfigError& error) {
       EXPECT_NE(std::string(error.what()).find(key), std::string::npos) << error.what();

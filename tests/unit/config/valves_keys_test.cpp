@@ -9,7 +9,7 @@
 namespace softarm {
 namespace {
 
-constexpr const char* kArm = R"(name: valves
+constexpr const char* kArmWithValves = R"(name: valves
 arm: {segments: 2, length_m: 0.25, mass_kg: 0.25, stiffness_nm_per_rad: 2, damping_nms_per_rad: 0.5}
 actuation: {chambers: {angle_rad: [0, 2, 4], gain_nm_per_bar: 1}}
 control: {kp_nm_per_rad: 1}
@@ -20,7 +20,7 @@ reference:
 class ValvesKeys : public ::testing::Test {
  protected:
   Experiment load(const std::string& valves) {
-    return load_experiment(folder.write("a.yaml", kArm + valves));
+    return load_experiment(folder.write("a.yaml", kArmWithValves + valves));
   }
   void refuses(const std::string& valves, const std::string& evidence) {
     try {
@@ -68,7 +68,7 @@ TEST_F(ValvesKeys, LeftOutTheyHaveTheirDefaults) {
 }
 
 TEST_F(ValvesKeys, AnArmThatNoTerminalHoldsNeedsNone) {
-  std::string many = kArm;
+  std::string many = kArmWithValves;
   many.replace(many.find("segments: 2"), 11, "segments: 120");
   const Experiment big = load_experiment(folder.write("big.yaml", many));
   EXPECT_EQ(big.valves.order.size(), 360u);

@@ -5,6 +5,7 @@
 #include <random>
 
 #include "softarm/control/curvature_controller.hpp"
+#include "softarm/control/reference.hpp"
 #include "softarm/model/actuation_matrix.hpp"
 #include "softarm/model/arm.hpp"
 #include "softarm/model/dynamics.hpp"
@@ -63,6 +64,12 @@ void runge_kutta(Function&& f, double t, double h, Eigen::VectorXd& y) {
   const Eigen::VectorXd a = f(t, y), b = f(t + 0.5 * h, y + 0.5 * h * a),
                         c = f(t + 0.5 * h, y + 0.5 * h * b), d = f(t + h, y + h * c);
   y += h / 6.0 * (a + 2.0 * b + 2.0 * c + d);
+}
+
+inline ReferenceSample sampled(const Reference& reference, double t) {
+  ReferenceSample sample;
+  reference.sample(t, sample);
+  return sample;
 }
 
 }  // namespace softarm::test

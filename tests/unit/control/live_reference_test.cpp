@@ -16,12 +16,6 @@ constexpr double kTimeout = 0.2;
 
 ReferenceSettings live() { return {{{LiveReference{kTimeout}, 0.0}}}; }
 
-ReferenceSample sampled(const Reference& reference, double t) {
-  ReferenceSample sample;
-  reference.sample(t, sample);
-  return sample;
-}
-
 struct Sender {
   Vector2d u(double t) const { return 0.5 * Vector2d(std::cos(2.0 * t), std::sin(3.0 * t)); }
   Vector2d velocity(double t) const { return {-std::sin(2.0 * t), 1.5 * std::cos(3.0 * t)}; }
@@ -35,10 +29,10 @@ TEST(LiveReference, HoldsWhereTheArmIsUntilAMessageComes) {
   EXPECT_EQ(reference.receive(0.0, Vector2d::Zero(), Vector2d::Zero(), Vector2d::Zero()),
             LiveVerdict::not_live);  // not started
   reference.start(0.0, Vector2d(0.3, -0.2), Vector2d(0.1, 0.0));
-  EXPECT_LT((sampled(reference, 0.0).velocity - Vector2d(0.1, 0.0)).norm(), 1e-15);
+  EXPECT_LT((test::sampled(reference, 0.0).velocity - Vector2d(0.1, 0.0)).norm(), 1e-15);
   for (double t : {1.0, 2.0, 100.0}) {
-    EXPECT_LT((sampled(reference, t).u - Vector2d(0.3, -0.2)).norm(), 1e-15);
-    EXPECT_EQ(sampled(reference, t).velocity.norm(), 0.0);
+    EXPECT_LT((test::sampled(reference, t).u - Vector2d(0.3, -0.2)).norm(), 1e-15);
+    EXPECT_EQ(test::sampled(reference, t).velocity.norm(), 0.0);
   }
 }
 
@@ -50,16 +44,16 @@ TEST(LiveReference, FollowsAStreamSmoothlyAndExactly) {
     double jump = 0.0, late_error = 0.0;
     for (int k = 0; k < static_cast<int>(4.0 / period); ++k) {
       const double t = k * period;
-      const ReferenceSample before = sampled(reference, t);
+      const ReferenceSample before = test::sampled(reference, t);
       ASSERT_EQ(reference.receive(t, sender.u(t), sender.velocity(t), sender.acceleration(t)),
                 LiveVerdict::accepted);
-      const ReferenceSample after = sampled(reference, t);
+      const ReferenceSample after = test::sampled(reference, t);
       jump = std::max({jump, (after.u - before.u).norm(), (after.velocity - before.velocity).norm(),
                        (after.acceleration - before.acceleration).norm()});
       if (t < 1.5) continue;
       for (double part : {0.0, 0.3, 0.9}) {
         const double now = t + part * period;
-        late_error = std::max(late_error, (sampled(reference, now).u - sender.u(now)).norm());
+        late_error = std::max(late_error, (test::sampled(reference, now).u - sender.u(now)).norm());
       }
     }
     EXPECT_LT(jump, 1e-9) << period;  // u, u' and u'' are continuous from message to message
@@ -77,13 +71,13 @@ TEST(LiveReference, ComesToRestAtTheLastMessage) {
     const double t = 0.01 * k;
     reference.receive(t, sender.u(t), sender.velocity(t), sender.acceleration(t));
   }
-  const ReferenceSample last = sampled(reference, 1.0 + kTimeout - 1e-9),
-                        rest = sampled(reference, 1.0 + kTimeout + 1e-9);
+  const ReferenceSample last = test::sampled(reference, 1.0 + kTimeout - 1e-9),
+                        rest = test::sampled(reference, 1.0 + kTimeout + 1e-9);
   EXPECT_LT((last.u - rest.u).norm(), 1e-7);
   EXPECT_LT((last.velocity - rest.velocity).norm(), 1e-7);
   EXPECT_LT((last.acceleration - rest.acceleration).norm(), 1e-6);
-  EXPECT_LT((sampled(reference, 3.0).u - sender.u(1.0)).norm(), 1e-12);
-  EXPECT_LT(sampled(reference, 3.0).velocity.norm(), 1e-12);
+  EXPECT_LT((test::sampled(reference, 3.0).u - sender.u(1.0)).norm(), 1e-12);
+  EXPECT_LT(test::sampled(reference, 3.0).velocity.norm(), 1e-12);
 }
 
 TEST(LiveReference, BlendsAStepAndRefusesALargerOne) {
@@ -93,16 +87,16 @@ TEST(LiveReference, BlendsAStepAndRefusesALargerOne) {
   const Vector2d zero = Vector2d::Zero();
   reference.start(0.0, zero, zero);
   EXPECT_EQ(reference.receive(0.1, Vector2d(0.19, 0.0), zero, zero), LiveVerdict::accepted);
-  EXPECT_LT(sampled(reference, 0.1).u.norm(), 1e-15);
+  EXPECT_LT(test::sampled(reference, 0.1).u.norm(), 1e-15);
   double fastest = 0.0;
   for (double t = 0.1; t < 2.0; t += 0.01) {
-    fastest = std::max(fastest, sampled(reference, t).velocity.norm());
+    fastest = std::max(fastest, test::sampled(reference, t).velocity.norm());
   }
   EXPECT_LT(fastest, 0.19 * 1.875 / 0.9);
-  EXPECT_NEAR(sampled(reference, 2.0).u[0], 0.19, 1e-12);
+  EXPECT_NEAR(test::sampled(reference, 2.0).u[0], 0.19, 1e-12);
   EXPECT_EQ(reference.receive(2.0, Vector2d(0.19, 0.21), zero, zero), LiveVerdict::step_too_large);
-  EXPECT_NEAR(sampled(reference, 2.0).u[0], 0.19, 1e-12);  // nothing happened
-  EXPECT_EQ(sampled(reference, 2.1).u[1], 0.0);
+  EXPECT_NEAR(test::sampled(reference, 2.0).u[0], 0.19, 1e-12);  // nothing happened
+  EXPECT_EQ(test::sampled(reference, 2.1).u[1], 0.0);
 }
 
 TEST(LiveReference, RefusesWhatIsNotFitToFollow) {
@@ -117,7 +111,7 @@ TEST(LiveReference, RefusesWhatIsNotFitToFollow) {
   EXPECT_EQ(reference.receive(0.1, Vector2d(2.6, 0.0), zero, zero), LiveVerdict::out_of_limits);
   EXPECT_EQ(reference.receive(0.1, zero, Vector2d(0.0, 21.0), zero), LiveVerdict::out_of_limits);
   EXPECT_EQ(reference.receive(0.1, zero, zero, Vector2d(1e3, 0.0)), LiveVerdict::out_of_limits);
-  EXPECT_EQ(sampled(reference, 5.0).u.norm(), 0.0);
+  EXPECT_EQ(test::sampled(reference, 5.0).u.norm(), 0.0);
 }
 
 TEST(LiveReference, OnlyItsOwnPhaseListens) {
@@ -132,11 +126,12 @@ TEST(LiveReference, OnlyItsOwnPhaseListens) {
   EXPECT_EQ(reference.receive(1.9, Vector2d(0.1, 0.1), Vector2d(0.5, 0.0), zero),
             LiveVerdict::accepted);
   // The next phase is joined to what the message made of this one.
-  const ReferenceSample before = sampled(reference, 2.0 - 1e-9), after = sampled(reference, 2.0);
+  const ReferenceSample before = test::sampled(reference, 2.0 - 1e-9),
+                        after = test::sampled(reference, 2.0);
   EXPECT_LT((before.u - after.u).norm(), 1e-7);
   EXPECT_LT((before.velocity - after.velocity).norm(), 1e-7);
   EXPECT_EQ(reference.receive(2.5, zero, zero, zero), LiveVerdict::not_live);
-  EXPECT_LT((sampled(reference, 4.0).u - Vector2d(0.2, 0.0)).norm(), 1e-12);
+  EXPECT_LT((test::sampled(reference, 4.0).u - Vector2d(0.2, 0.0)).norm(), 1e-12);
 }
 
 TEST(LiveReference, WindowDoesNotReachOverAMessage) {

@@ -30,12 +30,6 @@ ReferenceSettings sequence() {
            {SetPointReference{{-0.3, 0.4, 0.0, 0.9}}, 0.0}}};
 }
 
-ReferenceSample sampled(const Reference& reference, double t) {
-  ReferenceSample sample;
-  reference.sample(t, sample);
-  return sample;
-}
-
 /// u' is the derivative of u and u'' that of u' at random times, judged by their integrals over a
 /// short while. u'' may jump at `corners`.
 void check_derivatives(const Reference& reference, double from, double to,
@@ -46,8 +40,9 @@ void check_derivatives(const Reference& reference, double from, double to,
     const double t = random.uniform(from, to);
     bool corner = false;
     for (double c : corners) corner |= t <= c && c <= t + kShort;
-    const ReferenceSample a = sampled(reference, t), m = sampled(reference, t + 0.5 * kShort),
-                          b = sampled(reference, t + kShort);
+    const ReferenceSample a = test::sampled(reference, t),
+                          m = test::sampled(reference, t + 0.5 * kShort),
+                          b = test::sampled(reference, t + kShort);
     const VectorXd way = kShort / 6.0 * (a.velocity + 4.0 * m.velocity + b.velocity);
     EXPECT_LT((b.u - a.u - way).lpNorm<Eigen::Infinity>(), corner ? 3e-6 : 1e-10) << t;
     if (corner) continue;
@@ -65,7 +60,7 @@ TEST(Reference, PaperReferenceIs24) {
   Reference reference(one(PaperReference{}), test::gains(3, 1.0, 0.0), 3);
   reference.start(100.0, VectorXd::Zero(6), VectorXd::Zero(6));
   for (double t = 0.0; t < 5.0; t += 0.0137) {
-    const ReferenceSample sample = sampled(reference, 100.0 + t);
+    const ReferenceSample sample = test::sampled(reference, 100.0 + t);
     EXPECT_TRUE(sample.has_polar);
     EXPECT_FALSE(sample.limited);
     const double theta = t <= 1.0 ? 0.2 - 0.2 * std::cos(pi * t) : 0.4;
@@ -85,8 +80,8 @@ TEST(Reference, PolarDerivativesAreThoseOfTheAngles) {
   reference.start(0.0, VectorXd::Zero(6), VectorXd::Zero(6));
   for (double t : {0.0, 0.3, 0.7, 1.5, 3.0}) {
     const double h = 1e-4;
-    const ReferenceSample a = sampled(reference, t), b = sampled(reference, t + h),
-                          c = sampled(reference, t + 2.0 * h);
+    const ReferenceSample a = test::sampled(reference, t), b = test::sampled(reference, t + h),
+                          c = test::sampled(reference, t + 2.0 * h);
     EXPECT_LT(((c.polar - a.polar) / (2.0 * h) - b.polar_velocity).norm(), 1e-6);
     EXPECT_LT(((c.polar_velocity - a.polar_velocity) / (2.0 * h) - b.polar_acceleration).norm(),
               1e-6);
@@ -101,13 +96,14 @@ TEST(Reference, JoinedFromAnywhereItMeetsTheCurveAfterTheBlend) {
   for (int trial = 0; trial < 50; ++trial) {
     const VectorXd u = random.vector(4, 1.0), velocity = random.vector(4, 2.0);
     joined.start(7.0, u, velocity);
-    const ReferenceSample first = sampled(joined, 7.0);
+    const ReferenceSample first = test::sampled(joined, 7.0);
     EXPECT_LT((first.u - u).norm(), 1e-14);
     EXPECT_LT((first.velocity - velocity).norm(), 1e-14);
     EXPECT_FALSE(first.has_polar);
-    expect_same_motion(sampled(joined, 6.5), first, 1e-15);  // before the start: as at the start
+    expect_same_motion(test::sampled(joined, 6.5), first,
+                       1e-15);  // before the start: as at the start
     for (double t : {8.0, 8.3, 11.0}) {
-      const ReferenceSample a = sampled(joined, t), b = sampled(plain, t - 7.0);
+      const ReferenceSample a = test::sampled(joined, t), b = test::sampled(plain, t - 7.0);
       expect_same_motion(a, b, 1e-13);
       EXPECT_LT((a.acceleration - b.acceleration).norm(), 1e-12);
       EXPECT_TRUE(a.has_polar);
@@ -125,12 +121,12 @@ TEST(Reference, ABlendTakesLongerWhereTheSpeedLimitAsks) {
   reference.start(0.0, Eigen::Vector2d(-1.0, 0.0), VectorXd::Zero(2));
   double fastest = 0.0;
   for (double t = 0.0; t < 10.0; t += 0.01) {
-    const ReferenceSample sample = sampled(reference, t);
+    const ReferenceSample sample = test::sampled(reference, t);
     fastest = std::max(fastest, sample.velocity.norm());
     EXPECT_FALSE(sample.limited);
   }
   EXPECT_NEAR(fastest, 0.5, 1e-3);
-  EXPECT_NEAR(sampled(reference, 7.6).u[0], 1.0, 1e-12);  // 1.875 * 2 rad / 0.5 rad/s = 7.5 s
+  EXPECT_NEAR(test::sampled(reference, 7.6).u[0], 1.0, 1e-12);  // 1.875 * 2 rad / 0.5 rad/s = 7.5 s
 }
 
 TEST(Reference, WayPointsArePassedAtRest) {
@@ -138,14 +134,14 @@ TEST(Reference, WayPointsArePassedAtRest) {
   const WayPointReference points = way();
   reference.start(0.0, Eigen::Vector4d(0.0, 0.0, 0.1, 0.0), VectorXd::Zero(4));
   for (const WayPoint& point : points.points) {
-    const ReferenceSample sample = sampled(reference, point.time_s);
+    const ReferenceSample sample = test::sampled(reference, point.time_s);
     for (int i = 0; i < 4; ++i) {
       EXPECT_NEAR(sample.u[i], point.u_rad[static_cast<std::size_t>(i)], 1e-14);
     }
     EXPECT_LT(sample.velocity.norm() + sample.acceleration.norm(), 1e-12);
   }
-  EXPECT_EQ(sampled(reference, 0.2).velocity.norm(), 0.0);
-  EXPECT_EQ(sampled(reference, 9.0).velocity.norm(), 0.0);
+  EXPECT_EQ(test::sampled(reference, 0.2).velocity.norm(), 0.0);
+  EXPECT_EQ(test::sampled(reference, 9.0).velocity.norm(), 0.0);
   check_derivatives(reference, 0.0, 3.0, {0.5, 1.5, 2.0}, 3);
 }
 
@@ -156,7 +152,7 @@ TEST(Reference, WayPointsRepeat) {
   Reference reference(one(round), test::gains(2, 1.0, 0.0), 2);
   reference.start(0.0, Eigen::Vector4d(0.0, 0.0, 0.1, 0.0), VectorXd::Zero(4));
   for (double t = 0.6; t < 3.0; t += 0.05) {
-    expect_same_motion(sampled(reference, t), sampled(reference, t + 4.0 * 2.5), 1e-12);
+    expect_same_motion(test::sampled(reference, t), test::sampled(reference, t + 4.0 * 2.5), 1e-12);
   }
   check_derivatives(reference, 2.5, 6.0, {3.0, 4.0, 4.5, 5.5}, 4);
 }
@@ -169,15 +165,15 @@ TEST(Reference, PhasesFollowEachOtherSmoothly) {
   const std::vector<double> corners{1.0, 1.3, 2.3, 3.4, 3.9, 4.4, 4.9, 5.1, 5.4, 6.1, 7.1};
   check_derivatives(reference, 0.0, 8.0, corners, 5);
   for (double t : {1.3, 3.4, 5.1, 6.1}) {
-    expect_same_motion(sampled(reference, t - 1e-9), sampled(reference, t), 1e-7);
+    expect_same_motion(test::sampled(reference, t - 1e-9), test::sampled(reference, t), 1e-7);
   }
-  EXPECT_NEAR(sampled(reference, 1.2).u[0], 0.3, 1e-12);
-  EXPECT_NEAR(sampled(reference, 4.9).u[0], 0.8, 1e-12);  // way point at 3.4 + 1.5
-  EXPECT_NEAR(sampled(reference, 99.0).u[3], 0.9, 1e-12);
+  EXPECT_NEAR(test::sampled(reference, 1.2).u[0], 0.3, 1e-12);
+  EXPECT_NEAR(test::sampled(reference, 4.9).u[0], 0.8, 1e-12);  // way point at 3.4 + 1.5
+  EXPECT_NEAR(test::sampled(reference, 99.0).u[3], 0.9, 1e-12);
   // A function of time: asking in any order gives the same.
-  const ReferenceSample once = sampled(reference, 2.0);
-  sampled(reference, 7.0);
-  expect_same_motion(once, sampled(reference, 2.0), 0.0 + 1e-300);
+  const ReferenceSample once = test::sampled(reference, 2.0);
+  test::sampled(reference, 7.0);
+  expect_same_motion(once, test::sampled(reference, 2.0), 0.0 + 1e-300);
 }
 
 TEST(Reference, StartsAgainAfterHold) {
@@ -185,11 +181,11 @@ TEST(Reference, StartsAgainAfterHold) {
   EXPECT_FALSE(reference.started());
   reference.start(0.0, VectorXd::Zero(4), VectorXd::Zero(4));
   EXPECT_TRUE(reference.started());
-  sampled(reference, 4.0);
+  test::sampled(reference, 4.0);
   const VectorXd u = VectorXd::Constant(4, 0.7);
   reference.start(50.0, u, VectorXd::Zero(4));
-  EXPECT_LT((sampled(reference, 50.0).u - u).norm(), 1e-15);
-  EXPECT_NEAR(sampled(reference, 51.2).u[0], 0.3, 1e-12);  // the first phase again
+  EXPECT_LT((test::sampled(reference, 50.0).u - u).norm(), 1e-15);
+  EXPECT_NEAR(test::sampled(reference, 51.2).u[0], 0.3, 1e-12);  // the first phase again
 }
 
 TEST(Reference, WindowDoesNotReachOverTheStart) {
@@ -202,8 +198,8 @@ TEST(Reference, WindowDoesNotReachOverTheStart) {
   EXPECT_NEAR(window.interval_s, 0.014, 1e-12);
   reference.window(12.0, 0.01, window);
   EXPECT_NEAR(window.interval_s, 0.02, 1e-12);
-  EXPECT_EQ((window.after.u - sampled(reference, 12.01).u).norm(), 0.0);
-  EXPECT_EQ((window.before.u - sampled(reference, 11.99).u).norm(), 0.0);
+  EXPECT_EQ((window.after.u - test::sampled(reference, 12.01).u).norm(), 0.0);
+  EXPECT_EQ((window.before.u - test::sampled(reference, 11.99).u).norm(), 0.0);
   reference.window(12.0, 0.0, window);
   EXPECT_EQ(window.interval_s, 0.0);
 }
@@ -216,17 +212,17 @@ TEST(Reference, SoftLimitBendsThetaWithExactDerivatives) {
   reference.start(0.0, Eigen::Vector4d(0.3, 0.3, 0.0, 0.0), Eigen::Vector4d(1.2, 0.2, 0.0, 0.1));
   bool limited = false;
   for (double t = 0.0; t < 1.0; t += 0.001) {
-    const ReferenceSample sample = sampled(reference, t);
+    const ReferenceSample sample = test::sampled(reference, t);
     EXPECT_LT(sample.u.head<2>().norm(), 0.5);
     limited |= sample.limited;
   }
   EXPECT_TRUE(limited);
-  EXPECT_FALSE(sampled(reference, 1.0).limited);
+  EXPECT_FALSE(test::sampled(reference, 1.0).limited);
   test::Random random(6);
   for (int trial = 0; trial < 1000; ++trial) {
     const double t = random.uniform(0.01, 0.95), h = 1e-5;
-    const ReferenceSample a = sampled(reference, t - h), m = sampled(reference, t),
-                          b = sampled(reference, t + h);
+    const ReferenceSample a = test::sampled(reference, t - h), m = test::sampled(reference, t),
+                          b = test::sampled(reference, t + h);
     EXPECT_LT(((b.u - a.u) / (2.0 * h) - m.velocity).norm(), 2e-4);
     EXPECT_LT(((b.velocity - a.velocity) / (2.0 * h) - m.acceleration).norm(), 0.1);  // C2 only
   }

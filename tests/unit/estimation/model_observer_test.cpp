@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "counted_malloc.hpp"
+#include "milliseconds.hpp"
 #include "softarm/base/time.hpp"
 #include "softarm/estimation/frame_validator.hpp"
 #include "true_arm.hpp"
@@ -19,7 +20,7 @@ using test::SmoothMotion;
 using test::TrueArm;
 
 constexpr double kPeriod_s = 2e-3, kLag_s = 0.02;
-constexpr std::int64_t kMs = 1'000'000;
+using test::kMs;
 
 EstimationSettings settings_of(double noise_rad) {
   EstimationSettings settings;

@@ -30,13 +30,13 @@ std::vector<DhJoint> odd_robot(testing_support::RandomArm& random) {
   return joints;
 }
 
-struct Dynamics {
+struct ChainDynamics {
   Eigen::MatrixXd B = Eigen::MatrixXd(kJoints, kJoints), C = B;
   Eigen::VectorXd G = Eigen::VectorXd(kJoints);
 };
 
-Dynamics dynamics(SerialRobot& robot, const Eigen::VectorXd& xi, const Eigen::VectorXd& rate) {
-  Dynamics out;
+ChainDynamics dynamics(SerialRobot& robot, const Eigen::VectorXd& xi, const Eigen::VectorXd& rate) {
+  ChainDynamics out;
   robot.update(xi, rate);
   robot.dynamics(kGravity, out.B, out.C, out.G);
   return out;

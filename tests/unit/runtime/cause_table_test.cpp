@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "milliseconds.hpp"
 #include "softarm/runtime/activation_limit.hpp"
 #include "softarm/runtime/safety_monitor.hpp"
 #include "softarm/runtime/settings.hpp"
@@ -17,7 +18,7 @@
 namespace softarm {
 namespace {
 
-constexpr std::int64_t kMs = 1'000'000;
+using test::kMs;
 constexpr double kPeriod_s = 0.002;
 constexpr int kGoodFrames = 50;
 

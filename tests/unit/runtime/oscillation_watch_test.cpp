@@ -12,7 +12,7 @@
 namespace softarm {
 namespace {
 
-constexpr double kPeriod_s = 0.002;
+constexpr double kTick_s = 0.002;
 using Signal = std::function<double(double time_s)>;
 
 Signal sine(double amplitude, double hz) {
@@ -25,11 +25,11 @@ Signal fading(double amplitude, double hz, double rate_1ps) {
 /// When the second of four coordinates is found to oscillate; -1: not within `duration_s`.
 double found_after_s(const Signal& error, const Signal& reference, double duration_s = 60.0,
                      const SafetySettings& settings = {}) {
-  OscillationWatch watch(settings, kPeriod_s, 4);
+  OscillationWatch watch(settings, kTick_s, 4);
   SegmentVector r = SegmentVector::Constant(4, 0.3), u = r;
   std::mt19937 random(1);
   std::normal_distribution<double> noise(0.0, 0.004);
-  for (double t = 0.0; t < duration_s; t += kPeriod_s) {
+  for (double t = 0.0; t < duration_s; t += kTick_s) {
     r[1] = reference(t);
     u[1] = r[1] - error(t) + noise(random);
     watch.judge(r, u);
@@ -76,14 +76,14 @@ TEST(OscillationWatch, SmallSlowAndDisabledAreNone) {
 }
 
 TEST(OscillationWatch, StartsAgain) {
-  OscillationWatch watch({}, kPeriod_s, 2);
+  OscillationWatch watch({}, kTick_s, 2);
   SegmentVector r = SegmentVector::Zero(2), u = r;
   const Signal swing = sine(0.1, 2.0);
   const long before = test::allocations;
-  for (double t = 0.0; t < 60.0; t += kPeriod_s) {
+  for (double t = 0.0; t < 60.0; t += kTick_s) {
     u[0] = swing(t);
     watch.judge(r, u);
-    if (std::fmod(t, 1.0) < kPeriod_s) watch.reset();
+    if (std::fmod(t, 1.0) < kTick_s) watch.reset();
     ASSERT_FALSE(watch.oscillates());
   }
   EXPECT_EQ(test::allocations, before);

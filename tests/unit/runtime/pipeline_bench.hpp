@@ -8,14 +8,13 @@
 #include <functional>
 #include <span>
 
+#include "milliseconds.hpp"
 #include "softarm/base/time.hpp"
 #include "softarm/config/load.hpp"
 #include "softarm/model/kinematics.hpp"
 #include "softarm/runtime/control_pipeline.hpp"
 
 namespace softarm::test {
-
-constexpr std::int64_t kMs = 1'000'000;
 
 inline Experiment paper_arm() {
   return load_experiment(SOFTARM_SOURCE_DIR "/config/paper_arm.yaml");

@@ -5,13 +5,14 @@
 #include <functional>
 #include <random>
 
+#include "milliseconds.hpp"
 #include "softarm/base/time.hpp"
 #include "softarm/runtime/settings.hpp"
 
 namespace softarm {
 namespace {
 
-constexpr std::int64_t kMs = 1'000'000;
+using test::kMs;
 constexpr double kPeriod_s = 0.002;
 
 /// Steps time by hand: 500 Hz ticks, 200 Hz frames of 5 ms latency unless a test says otherwise.

@@ -6,13 +6,14 @@
 #include <cmath>
 #include <vector>
 
+#include "milliseconds.hpp"
 #include "softarm/base/time.hpp"
 #include "unit/simulation/paper_arm.hpp"
 
 namespace softarm {
 namespace {
 
-constexpr std::int64_t kMs = 1'000'000;
+using test::kMs;
 constexpr std::int64_t kStart = 987'654'321'012'345;
 
 PlantSettings sensed_arm() {

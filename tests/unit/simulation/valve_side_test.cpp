@@ -5,10 +5,12 @@
 #include <algorithm>
 #include <array>
 
+#include "milliseconds.hpp"
+
 namespace softarm {
 namespace {
 
-constexpr std::int64_t kMs = 1'000'000;
+using test::kMs;
 
 class SideOfThePlant : public ::testing::Test {
  protected:

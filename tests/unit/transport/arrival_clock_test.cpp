@@ -8,12 +8,14 @@
 #include <random>
 #include <vector>
 
+#include "milliseconds.hpp"
 #include "softarm/estimation/clock_relation.hpp"
 
 namespace softarm {
 namespace {
 
-constexpr std::int64_t kUs = 1000, kMs = 1'000'000, kSecond = 1'000'000'000;
+using test::kMs;
+constexpr std::int64_t kUs = 1000, kSecond = 1'000'000'000;
 constexpr std::int64_t kDate_ns = 1'700'000'000 * kSecond;
 
 /// Packets every 5 ms, handled by a loop of 2 ms that is held up for up to 80 ms now and then.

@@ -7,10 +7,12 @@
 #include <random>
 #include <vector>
 
+#include "milliseconds.hpp"
+
 namespace softarm {
 namespace {
 
-constexpr std::int64_t kMs = 1'000'000;
+using test::kMs;
 
 /// Three segments at 200 Hz; bodies carry their stamp and number in their position.
 class Assembling : public ::testing::Test {

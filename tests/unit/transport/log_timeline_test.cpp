@@ -13,10 +13,10 @@
 namespace softarm {
 namespace {
 
-constexpr std::int64_t kMs = 1000;  // in us
+constexpr std::int64_t kMs_us = 1000;
 
 template <class Message>
-std::string encoded(const Message& message) {
+std::string text_of(const Message& message) {
   std::string bytes(static_cast<std::size_t>(message.getEncodedSize()), '\0');
   message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
   return bytes;
@@ -32,20 +32,20 @@ struct Logged {
 class Timeline : public ::testing::Test {
  protected:
   Timeline() {
-    for (std::int64_t t = 0; t < 10'000 * kMs; t += kMs) {
-      if (t % (2 * kMs) == 0) add_command(t, t + 77'000'000);
-      if (t % (5 * kMs) == 0) add_frame(t, t + 5'000'000);
+    for (std::int64_t t = 0; t < 10'000 * kMs_us; t += kMs_us) {
+      if (t % (2 * kMs_us) == 0) add_command(t, t + 77'000'000);
+      if (t % (5 * kMs_us) == 0) add_frame(t, t + 5'000'000);
     }
   }
   void add_command(std::int64_t t, std::int64_t own_us) {
     softarm_messages::pressure_command_t message{};
     message.time_us = own_us;
-    events_.push_back({t, kWall_us + t, transport_.lcm.command_channel, encoded(message)});
+    events_.push_back({t, kWall_us + t, transport_.lcm.command_channel, text_of(message)});
   }
   void add_frame(std::int64_t t, std::int64_t own_us) {
     softarm_messages::mocap_frame_t message{};
     message.capture_time_us = own_us;
-    events_.push_back({t, kWall_us + t, transport_.lcm.mocap_channel, encoded(message)});
+    events_.push_back({t, kWall_us + t, transport_.lcm.mocap_channel, text_of(message)});
   }
   /// Sets the logger's clock by `step_us` at the instant `at_us`.
   void set_clock(std::int64_t at_us, std::int64_t step_us) {
@@ -89,11 +89,11 @@ TEST_F(Timeline, OfAGoodLogIsThatOfItsStamps) {
 
 TEST_F(Timeline, AClockThatIsSetIsBridged) {
   for (const std::int64_t step_us :
-       {-2'000 * kMs, 2'000 * kMs, -100 * kMs, 400 * kMs, -600'000 * kMs, 60'000 * kMs,
-        -86'400'000 * kMs, 31'536'000'000 * kMs, -kWall_us}) {
+       {-2'000 * kMs_us, 2'000 * kMs_us, -100 * kMs_us, 400 * kMs_us, -600'000 * kMs_us,
+        60'000 * kMs_us, -86'400'000 * kMs_us, 31'536'000'000 * kMs_us, -kWall_us}) {
     const auto before = events_;
     timeline_ = LogTimeline(transport_);
-    set_clock(4'001 * kMs, step_us);
+    set_clock(4'001 * kMs_us, step_us);
     EXPECT_LT(largest(errors()), 0.006) << step_us;
     ASSERT_EQ(timeline_.breaks().size(), 1u) << step_us << ": " << timeline_.text();
     EXPECT_EQ(timeline_.breaks()[0].kind, LogBreak::Kind::clock_set);
@@ -105,30 +105,30 @@ TEST_F(Timeline, AClockThatIsSetIsBridged) {
 }
 
 TEST_F(Timeline, ASmallStepIsFoundByTheClocksOfOurPrograms) {
-  set_clock(4'001 * kMs, 60 * kMs);
+  set_clock(4'001 * kMs_us, 60 * kMs_us);
   const auto found = errors();
   EXPECT_LT(std::abs(found.back()), 0.001);
   EXPECT_EQ(timeline_.breaks().size(), 1u) << timeline_.text();
 }
 
 TEST_F(Timeline, SeveralStepsAreBridged) {
-  set_clock(2'000 * kMs, -2'000 * kMs);
-  set_clock(5'000 * kMs, 7'000 * kMs);
-  set_clock(8'000 * kMs, -5'000 * kMs);
+  set_clock(2'000 * kMs_us, -2'000 * kMs_us);
+  set_clock(5'000 * kMs_us, 7'000 * kMs_us);
+  set_clock(8'000 * kMs_us, -5'000 * kMs_us);
   EXPECT_LT(largest(errors()), 0.006);
   EXPECT_EQ(timeline_.breaks().size(), 3u);
 }
 
 // Motion capture on the logger's computer, stamped by its wall clock.
 TEST_F(Timeline, FramesMayBeStampedByTheClockThatIsSet) {
-  for (const std::int64_t step_us : {-3'000 * kMs, 3'000 * kMs}) {
+  for (const std::int64_t step_us : {-3'000 * kMs_us, 3'000 * kMs_us}) {
     timeline_ = LogTimeline(transport_);
     events_.clear();
-    for (std::int64_t t = 0; t < 10'000 * kMs; t += kMs) {
-      if (t % (2 * kMs) == 1 * kMs) add_command(t, t + 77'000'000);
-      if (t % (5 * kMs) == 0) add_frame(t, kWall_us + t + (t >= 4'000 * kMs ? step_us : 0));
+    for (std::int64_t t = 0; t < 10'000 * kMs_us; t += kMs_us) {
+      if (t % (2 * kMs_us) == 1 * kMs_us) add_command(t, t + 77'000'000);
+      if (t % (5 * kMs_us) == 0) add_frame(t, kWall_us + t + (t >= 4'000 * kMs_us ? step_us : 0));
     }
-    set_clock(4'000 * kMs, step_us);
+    set_clock(4'000 * kMs_us, step_us);
     EXPECT_LT(largest(errors()), 0.006) << step_us;
   }
 }
@@ -136,7 +136,7 @@ TEST_F(Timeline, FramesMayBeStampedByTheClockThatIsSet) {
 TEST_F(Timeline, FramesAloneAreBridgedByTheirSendersClock) {
   std::erase_if(events_,
                 [&](const Logged& each) { return each.channel != transport_.lcm.mocap_channel; });
-  set_clock(4'000 * kMs, -2'000 * kMs);
+  set_clock(4'000 * kMs_us, -2'000 * kMs_us);
   EXPECT_LT(largest(errors()), 0.006);
   EXPECT_EQ(timeline_.breaks().size(), 1u);
 }
@@ -150,9 +150,9 @@ TEST_F(Timeline, ADamagedStampMovesNothing) {
 
 TEST_F(Timeline, ALongGapIsShortened) {
   for (Logged& each : events_)
-    if (each.true_us >= 5'000 * kMs) {
-      each.true_us += 600'000 * kMs;
-      each.stamp_us += 600'000 * kMs;
+    if (each.true_us >= 5'000 * kMs_us) {
+      each.true_us += 600'000 * kMs_us;
+      each.stamp_us += 600'000 * kMs_us;
     }
   std::vector<Logged> late;
   for (Logged& each : events_) late.push_back(each);
@@ -171,14 +171,14 @@ TEST_F(Timeline, ALongGapIsShortened) {
 
 // As `cat first.log second.log`, the computers started again in between, with and without battery.
 TEST_F(Timeline, AnotherRecordingIsARestart) {
-  for (const std::int64_t wall_us :
-       {kWall_us + 3'600'000 * kMs, kWall_us - 3'600'000 * kMs, std::int64_t{60'000 * kMs}}) {
+  for (const std::int64_t wall_us : {kWall_us + 3'600'000 * kMs_us, kWall_us - 3'600'000 * kMs_us,
+                                     std::int64_t{60'000 * kMs_us}}) {
     timeline_ = LogTimeline(transport_);
     events_.resize(7000);
     const std::size_t first = events_.size();
-    for (std::int64_t t = 0; t < 5'000 * kMs; t += kMs) {
-      if (t % (2 * kMs) == 0) add_command(t, t + 11'000'000);
-      if (t % (5 * kMs) == 0) add_frame(t, t + 1'000'000);
+    for (std::int64_t t = 0; t < 5'000 * kMs_us; t += kMs_us) {
+      if (t % (2 * kMs_us) == 0) add_command(t, t + 11'000'000);
+      if (t % (5 * kMs_us) == 0) add_frame(t, t + 1'000'000);
     }
     for (std::size_t k = first; k < events_.size(); ++k) events_[k].stamp_us += wall_us - kWall_us;
     const auto found = errors();
@@ -192,9 +192,9 @@ TEST_F(Timeline, AnotherRecordingIsARestart) {
 // Stamps of a sender that has no clock are those of the logger.
 TEST_F(Timeline, SendersWithoutAClockAreAccepted) {
   events_.clear();
-  for (std::int64_t t = 0; t < 10'000 * kMs; t += kMs) {
-    if (t % (2 * kMs) == 0) add_command(t, 0);
-    if (t % (5 * kMs) == 0) add_frame(t, t + 5'000'000);
+  for (std::int64_t t = 0; t < 10'000 * kMs_us; t += kMs_us) {
+    if (t % (2 * kMs_us) == 0) add_command(t, 0);
+    if (t % (5 * kMs_us) == 0) add_frame(t, t + 5'000'000);
   }
   EXPECT_EQ(largest(errors()), 0.0);
 }

@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "milliseconds.hpp"
 #include "unit/valves/fake_backend.hpp"
 
 namespace softarm {
@@ -28,7 +29,7 @@ class NamedBackend : public test::FakeBackend {
 };
 const ValveBackendRegistration<NamedBackend> kRegistration("fake");
 
-constexpr std::int64_t kMs = 1'000'000;
+using test::kMs;
 constexpr std::int64_t kPeriod = 5 * kMs;
 
 class Driver : public ::testing::Test {

@@ -9,12 +9,13 @@
 #include <vector>
 
 #include "counted_malloc.hpp"
+#include "milliseconds.hpp"
 
 namespace softarm {
 namespace {
 
-constexpr std::int64_t kMs = 1'000'000;
-constexpr std::int64_t kPeriod = 5 * kMs;
+using test::kMs;
+constexpr std::int64_t kCycle = 5 * kMs;
 
 class Guard : public ::testing::Test {
  protected:
@@ -33,7 +34,7 @@ class Guard : public ::testing::Test {
 
   /// One cycle with a terminal that does `result`; its valves follow at once unless `stuck`.
   ValveAction cycle(LinkResult result = LinkResult::ok) {
-    now += kPeriod;
+    now += kCycle;
     guard->wake(now);
     if (commanding) command(wanted[0], wanted[1]);
     const ValveAction action = guard->next(now);
@@ -63,7 +64,7 @@ class Guard : public ::testing::Test {
     if (guard->state() != ValveState::running) {
       EXPECT_TRUE(written.isZero());
     }
-    const double slew_bar = 2.0 * to_seconds(kPeriod) * settings.slew_bar_per_s;
+    const double slew_bar = 2.0 * to_seconds(kCycle) * settings.slew_bar_per_s;
     EXPECT_LE((written - before).maxCoeff(), slew_bar + 1e-12) << "whoever commands it";
     const LinkResult wrote = result == LinkResult::ok ? write_result : result;
     if (wrote == LinkResult::ok && !ignores_writes) held = written;
@@ -318,7 +319,7 @@ TEST_F(Guard, NoPressureIsWrittenWithoutAReadBackBeforeIt) {
 
 TEST_F(Guard, APauseOfTheClockIsAGapAndEndsTheCommandInForce) {
   run();
-  now += kPeriod;
+  now += kCycle;
   EXPECT_FALSE(guard->wake(now, true));
   EXPECT_EQ(guard->reason(), ValveReason::time_gap);
   commanding = false;
@@ -359,7 +360,7 @@ TEST_F(Guard, ASecondSenderVentsUntilOneHasLeftAndCommandsHaveBeenZero) {
   };
   const double before = written.maxCoeff();
   intrude(sequence + 1'000'000);
-  now += kPeriod;
+  now += kCycle;
   guard->wake(now);
   ASSERT_EQ(guard->next(now), ValveAction::exchange);
   exchange(LinkResult::ok);
@@ -419,10 +420,10 @@ TEST_F(Guard, ABrokenConnectionIsTriedAgainWithGrowingPauses) {
     }
   }
   // The terminal's time-out is 0.2 s: in every pause it vents.
-  EXPECT_NEAR(static_cast<double>(pauses[0]), 320.0 * kMs, kPeriod);
-  EXPECT_NEAR(static_cast<double>(pauses[1]), 640.0 * kMs, kPeriod);
-  EXPECT_NEAR(static_cast<double>(pauses[2]), 1280.0 * kMs, kPeriod);
-  EXPECT_NEAR(static_cast<double>(pauses[8]), 5000.0 * kMs, kPeriod) << "no longer than that";
+  EXPECT_NEAR(static_cast<double>(pauses[0]), 320.0 * kMs, kCycle);
+  EXPECT_NEAR(static_cast<double>(pauses[1]), 640.0 * kMs, kCycle);
+  EXPECT_NEAR(static_cast<double>(pauses[2]), 1280.0 * kMs, kCycle);
+  EXPECT_NEAR(static_cast<double>(pauses[8]), 5000.0 * kMs, kCycle) << "no longer than that";
   reachable = true;
   EXPECT_TRUE(reach(ValveState::running));
   EXPECT_EQ(guard->counters().connections, 2);
@@ -512,7 +513,7 @@ TEST_F(Guard, FailuresDoNotProlongTheWaitForATerminalThatIsNotReady) {
       cycle(k % 50 == 0 ? result : LinkResult::ok);
     EXPECT_EQ(guard->state(), ValveState::disconnected);
     EXPECT_EQ(guard->reason(), ValveReason::not_ready);
-    EXPECT_NEAR(static_cast<double>(now - since), 20'000.0 * kMs, 2 * kPeriod);
+    EXPECT_NEAR(static_cast<double>(now - since), 20'000.0 * kMs, 2 * kCycle);
   }
 }
 
@@ -689,7 +690,7 @@ TEST_F(Guard, AllocatesNothing) {
   run();
   const long before = test::allocations;
   for (int k = 0; k < 100; ++k) {
-    now += kPeriod;
+    now += kCycle;
     guard->wake(now);
     guard->next(now);
     const LinkResult result = k % 7 == 0 ? LinkResult::no_answer : LinkResult::ok;

@@ -5,12 +5,12 @@
 #include <functional>
 #include <string>
 
+#include "milliseconds.hpp"
 #include "softarm/commissioning/preflight/checks.hpp"
 #include "softarm/simulation/simulated_arm.hpp"
 
 namespace softarm::test {
 
-inline constexpr std::int64_t kMs = 1'000'000;
 inline constexpr std::int64_t kWall_ns = 1'700'000'000'000'000'000;
 
 /// A hanging arm with four chambers a segment, and what the checks are given of it.
