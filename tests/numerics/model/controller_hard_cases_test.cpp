@@ -17,7 +17,7 @@ using reference::Vector;
 using testing_support::RandomArm;
 using testing_support::State;
 
-constexpr double kPi = std::numbers::pi;
+using std::numbers::pi;
 
 class ControllerHardCases : public ::testing::TestWithParam<MassModel> {};
 
@@ -65,9 +65,9 @@ void expect_law(const ArmParameters& arm, RandomArm& random, const State& s, dou
 TEST_P(ControllerHardCases, GivesTheLawAtSpecialAngles) {
   RandomArm random(1);
   for (const double theta :
-       {0.0, 5e-324, 1e-300, 1e-160, 1e-12, 1e-8, 1e-4, 0.1, 0.5 * kPi, 2.0, kPi - 1e-9, kPi,
-        kPi + 1e-9, std::sqrt(12.0), 1.5 * kPi, std::sqrt(33.0), 2.0 * kPi, 7.0}) {
-    for (const double phi : {0.0, 0.3, kPi, -kPi, 2.0}) {
+       {0.0, 5e-324, 1e-300, 1e-160, 1e-12, 1e-8, 1e-4, 0.1, 0.5 * pi, 2.0, pi - 1e-9, pi,
+        pi + 1e-9, std::sqrt(12.0), 1.5 * pi, std::sqrt(33.0), 2.0 * pi, 7.0}) {
+    for (const double phi : {0.0, 0.3, pi, -pi, 2.0}) {
       const ArmParameters arm = random.arm(3, GetParam());
       State s = random.state(3, 1.0, phi == 0.3 ? 1e3 : 2.0);
       for (int i = 0; i < 3; ++i) {

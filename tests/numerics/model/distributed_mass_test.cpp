@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numbers>
 #include <vector>
 
 #include "softarm/model/dynamics.hpp"
@@ -100,7 +101,7 @@ TEST(DistributedMass, IsTheIntegralOverTheArc) {
 TEST(DistributedMass, HoldsAtSpecialAngles) {
   RandomArm random(2);
   const Quadrature rule = gauss_legendre(40);
-  const double pi = 3.14159265358979323846;
+  using std::numbers::pi;
   const ArmParameters arm = random.arm(3, MassModel::distributed);
   for (const double theta : {0.0,       5e-324,
                              1e-300,    1e-160,

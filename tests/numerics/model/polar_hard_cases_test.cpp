@@ -17,7 +17,7 @@ using reference::Real;
 using reference::Vector;
 using testing_support::RandomArm;
 
-constexpr double kPi = std::numbers::pi;
+using std::numbers::pi;
 constexpr Real kUlp = 2.22e-16L;
 
 struct PolarState {
@@ -73,10 +73,9 @@ class PolarHardCases : public ::testing::TestWithParam<MassModel> {
 TEST_P(PolarHardCases, ChainRuleHoldsAtSpecialAngles) {
   RandomArm random(1);
   const ArmParameters arm = random.arm(3, GetParam());
-  for (const double theta :
-       {0.0, 1e-300, 1e-160, 1e-12, 1e-8, 1e-4, 1e-2, 0.5, 0.5 * kPi, std::sqrt(12.0), kPi - 1e-9,
-        kPi, kPi + 1e-9, 1.5 * kPi, 2.0 * kPi, 7.0}) {
-    for (const double phi : {0.0, 0.4, 0.5 * kPi, kPi, -kPi, std::nextafter(kPi, 4.0), 3.5, -7.0}) {
+  for (const double theta : {0.0, 1e-300, 1e-160, 1e-12, 1e-8, 1e-4, 1e-2, 0.5, 0.5 * pi,
+                             std::sqrt(12.0), pi - 1e-9, pi, pi + 1e-9, 1.5 * pi, 2.0 * pi, 7.0}) {
+    for (const double phi : {0.0, 0.4, 0.5 * pi, pi, -pi, std::nextafter(pi, 4.0), 3.5, -7.0}) {
       for (const double sign : {1.0, -1.0}) {
         const double speed = phi == 0.4 ? 1e3 : 2.0;
         expect_chain_rule(arm, state(random, 3, sign * theta, phi, speed), theta);
@@ -103,8 +102,8 @@ TEST_P(PolarHardCases, ChainRuleHoldsForRandomStates) {
 TEST_P(PolarHardCases, ImpedanceIsThatOfThePaper) {
   // (14): K = diag(0, k), D = beta diag(theta^2, 1), from k I and beta I in u.
   RandomArm random(3);
-  for (const double theta : {0.0, 1e-160, 1e-8, 0.3, kPi, 7.0, -0.3, -1e-8, -7.0}) {
-    for (const double phi : {0.0, 1.0, kPi, -kPi, 3.3}) {
+  for (const double theta : {0.0, 1e-160, 1e-8, 0.3, pi, 7.0, -0.3, -1e-8, -7.0}) {
+    for (const double phi : {0.0, 1.0, pi, -pi, 3.3}) {
       const ArmParameters arm = random.arm(2, GetParam());
       const PolarState s = state(random, 2, theta, phi, 2.0);
       Eigen::VectorXd u(4), v(4), force = Eigen::VectorXd::Zero(4), zero = force;
@@ -138,7 +137,7 @@ TEST_P(PolarHardCases, BothSignsOfThetaAreTheSameArm) {
     PolarState a{Eigen::VectorXd(4), random.vector(4, 2.0)}, b = a;
     for (int i = 0; i < 2; ++i) {
       a.q.segment<2>(2 * i) << random.uniform(-3.0, 3.0), random.uniform(0.1, 6.0);
-      b.q.segment<2>(2 * i) << a.q(2 * i) + kPi, -a.q(2 * i + 1);
+      b.q.segment<2>(2 * i) << a.q(2 * i) + pi, -a.q(2 * i + 1);
       b.qd.segment<2>(2 * i) << a.qd(2 * i), -a.qd(2 * i + 1);
     }
     Eigen::VectorXd u(4), v(4), w(4);
@@ -152,16 +151,16 @@ TEST_P(PolarHardCases, BothSignsOfThetaAreTheSameArm) {
 }
 
 TEST_P(PolarHardCases, ThereAndBack) {
-  for (const double theta : {5e-324, 1e-310, 1e-300, 1e-160, 1e-12, 1e-3, 1.0, kPi, 7.0, 1e8}) {
-    for (const double phi : {0.0, 0.7, 0.5 * kPi, 3.0, std::nextafter(kPi, 0.0), kPi, -kPi, -3.0}) {
+  for (const double theta : {5e-324, 1e-310, 1e-300, 1e-160, 1e-12, 1e-3, 1.0, pi, 7.0, 1e8}) {
+    for (const double phi : {0.0, 0.7, 0.5 * pi, 3.0, std::nextafter(pi, 0.0), pi, -pi, -3.0}) {
       const Eigen::Vector2d q(phi, theta), qd(0.3, -0.7);
       Eigen::VectorXd u(2), back(2), v(2), rate(2);
       polar_to_u(q, u);
       u_to_polar(u, back);
       const double loss = theta < 1e-300 ? 1.0 : 4e-16;  // a denormal has one or two digits
       EXPECT_NEAR(back(1), theta, loss * theta);
-      EXPECT_LE(std::abs(std::remainder(back(0) - phi, 2.0 * kPi)), 2 * loss);
-      EXPECT_LE(std::abs(back(0)), kPi);
+      EXPECT_LE(std::abs(std::remainder(back(0) - phi, 2.0 * pi)), 2 * loss);
+      EXPECT_LE(std::abs(back(0)), pi);
       if (theta < 1e-300) continue;
       polar_velocity_to_u(q, qd, v);
       u_velocity_to_polar(q, v, rate);
@@ -174,13 +173,13 @@ TEST_P(PolarHardCases, ThereAndBack) {
 TEST_P(PolarHardCases, PhiCrossesPiWithoutAStepInU) {
   for (const double theta : {1e-12, 0.4, 3.0}) {
     Eigen::VectorXd before(2), after(2), q(2);
-    polar_to_u(Eigen::Vector2d(kPi, theta), before);
-    polar_to_u(Eigen::Vector2d(-kPi, theta), after);
+    polar_to_u(Eigen::Vector2d(pi, theta), before);
+    polar_to_u(Eigen::Vector2d(-pi, theta), after);
     EXPECT_LE((before - after).norm(), 3e-16 * theta);
     u_to_polar(Eigen::Vector2d(-theta, 1e-9 * theta), q);
-    EXPECT_NEAR(q(0), kPi - 1e-9, 1e-15);
+    EXPECT_NEAR(q(0), pi - 1e-9, 1e-15);
     u_to_polar(Eigen::Vector2d(-theta, -1e-9 * theta), q);
-    EXPECT_NEAR(q(0), -kPi + 1e-9, 1e-15);
+    EXPECT_NEAR(q(0), -pi + 1e-9, 1e-15);
   }
 }
 

@@ -21,7 +21,7 @@ using testing_support::State;
 
 constexpr Real kDoubleRounding = 1.2e-16L;  ///< of the golden numbers themselves
 
-Real largest(const Matrix& m) { return m.cwiseAbs().maxCoeff(); }
+Real largest_of(const Matrix& m) { return m.cwiseAbs().maxCoeff(); }
 
 /// The golden file's u or polar, both mass models.
 void expect_golden(const golden::Case& c, const golden::Terms& want, MassModel mass) {
@@ -97,19 +97,20 @@ void expect_golden_kinematics(const std::vector<golden::Case>& cases, Real rotat
     const Vector v = c.polar ? reference::polar_velocity_to_u(q, qd) : qd;
     const auto got = reference::kinematics(c.arm, u, v);
     const Matrix centres = c.expected.at("com_world").cast<Real>().transpose();
-    EXPECT_LE(largest(got.centres - centres), rotation_error * std::max(Real(1), largest(centres)))
+    EXPECT_LE(largest_of(got.centres - centres),
+              rotation_error * std::max(Real(1), largest_of(centres)))
         << c.id;
     const Matrix T = c.expected.at("T_world").cast<Real>().rightCols<4>();
-    EXPECT_LE(largest(got.rotations.back() - T.topLeftCorner<3, 3>()), rotation_error) << c.id;
-    EXPECT_LE(largest(got.positions.back() - T.topRightCorner<3, 1>()),
-              rotation_error * std::max(Real(1), largest(T)))
+    EXPECT_LE(largest_of(got.rotations.back() - T.topLeftCorner<3, 3>()), rotation_error) << c.id;
+    EXPECT_LE(largest_of(got.positions.back() - T.topRightCorner<3, 1>()),
+              rotation_error * std::max(Real(1), largest_of(T)))
         << c.id;
     if (c.polar) continue;
     for (const auto& [key, J] :
          {std::pair{"J_tip", got.jacobian}, std::pair{"Jdot_tip", got.jacobian_rate},
           std::pair{"Jw_tip", got.angular_jacobian}}) {
       const Matrix want = c.expected.at(key).cast<Real>();
-      EXPECT_LE(largest(J - want), rotation_error * std::max(Real(0.1), largest(want)))
+      EXPECT_LE(largest_of(J - want), rotation_error * std::max(Real(0.1), largest_of(want)))
           << c.id << key;
     }
   }
@@ -135,8 +136,8 @@ TEST_P(ReferenceModelOfArms, MoreNodesChangeNothing) {
     const Dynamics a = reference::dynamics(thick(arm, radius), u, v),
                    b = reference::dynamics(thick(arm, radius), u, v, 9);
     const Matrix inertia = a.s * a.s.transpose(), coriolis = a.s * a.r.transpose();
-    EXPECT_LE(largest((a.B - b.B).cwiseQuotient(inertia)), 1e-17L) << theta;
-    EXPECT_LE(largest((a.C - b.C).cwiseQuotient(coriolis)), 1e-17L) << theta;
+    EXPECT_LE(largest_of((a.B - b.B).cwiseQuotient(inertia)), 1e-17L) << theta;
+    EXPECT_LE(largest_of((a.C - b.C).cwiseQuotient(coriolis)), 1e-17L) << theta;
   }
 }
 
@@ -206,7 +207,7 @@ TEST(ReferenceModel, RingsOfPointsAreThinDiscs) {
     }
   }
   const Matrix got = reference::dynamics(thick(arm, radius), u, v).B;
-  EXPECT_LE(largest(got - want), 1e-17L * largest(want));
+  EXPECT_LE(largest_of(got - want), 1e-17L * largest_of(want));
 }
 
 TEST_P(ReferenceModelOfArms, JacobianIsTheSlopeOfTheTip) {
@@ -229,7 +230,7 @@ TEST_P(ReferenceModelOfArms, JacobianIsTheSlopeOfTheTip) {
   const Matrix rate = (8 * (at(u + e).jacobian - at(u - e).jacobian) -
                        (at(u + 2 * e).jacobian - at(u - 2 * e).jacobian)) /
                       (12 * h);
-  EXPECT_LE(largest(got.jacobian_rate - rate), 1e-12L * largest(rate));
+  EXPECT_LE(largest_of(got.jacobian_rate - rate), 1e-12L * largest_of(rate));
 }
 
 INSTANTIATE_TEST_SUITE_P(Length, ReferenceModelOfArms, ::testing::Values(false, true),

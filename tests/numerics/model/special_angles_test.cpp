@@ -16,7 +16,7 @@ using testing_support::expect_within;
 using testing_support::RandomArm;
 using testing_support::State;
 
-constexpr double kPi = std::numbers::pi;
+using std::numbers::pi;
 
 /// Straight, where squares underflow, both sides of every switch (s = 1, 4, 12, 33, 64 and what
 /// lies beside them), where sin or 1 - cos vanish, and beyond a full turn.
@@ -38,15 +38,15 @@ const std::vector<double>& special_angles() {
                                1e-1,
                                0.5,
                                1.0,
-                               0.5 * kPi,
-                               kPi - 1e-9,
-                               kPi,
-                               kPi + 1e-9,
+                               0.5 * pi,
+                               pi - 1e-9,
+                               pi,
+                               pi + 1e-9,
                                4.4934094579,
-                               1.5 * kPi,
-                               2.0 * kPi - 1e-9,
-                               2.0 * kPi,
-                               2.0 * kPi + 1e-9,
+                               1.5 * pi,
+                               2.0 * pi - 1e-9,
+                               2.0 * pi,
+                               2.0 * pi + 1e-9,
                                7.0};
     for (const double s : {1.0, 4.0, 12.0, 33.0}) {
       const double theta = std::sqrt(s);
@@ -64,7 +64,7 @@ class SpecialAngles : public ::testing::TestWithParam<testing_support::ArmKind> 
 TEST_P(SpecialAngles, OfEverySegmentAtOnce) {
   RandomArm random(1);
   for (const double theta : special_angles()) {
-    for (const double phi : {0.0, 0.3, 0.5 * kPi, kPi, -kPi, std::nextafter(kPi, 4.0), -2.0}) {
+    for (const double phi : {0.0, 0.3, 0.5 * pi, pi, -pi, std::nextafter(pi, 4.0), -2.0}) {
       const ArmParameters arm = random.arm(3, GetParam());
       State s = random.state(arm, 1.0, phi == 0.3 ? 1e3 : 2.0);
       for (int i = 0; i < 3; ++i) {

@@ -22,7 +22,7 @@ using test::TrueArm;
 constexpr double kPeriod_s = 2e-3, kLag_s = 0.02;
 using test::kMs;
 
-EstimationSettings settings_of(double noise_rad) {
+EstimationSettings observer_settings(double noise_rad) {
   EstimationSettings settings;
   settings.orientation_noise_rad = noise_rad;
   settings.observer = ObserverKind::model;
@@ -108,14 +108,14 @@ double prediction_error(Station& station, double from_s, double seconds) {
 
 TEST(ModelObserver, PredictsAnExactArmThroughLatencyAndLag) {
   const ArmParameters arm = test::arm_of(3);
-  Station station(arm, arm, settings_of(1e-6));
+  Station station(arm, arm, observer_settings(1e-6));
   // 5 ms at 0.9 rad/s would be 4.5 mrad; what is left is the error of steps of 2.5 ms.
   EXPECT_LT(prediction_error(station, 0.3, 1.0), 5e-5);
 }
 
 TEST(ModelObserver, IsQuieterThanOneFrame) {
   const ArmParameters arm = test::arm_of(3);
-  const EstimationSettings settings = settings_of(3.5e-3);
+  const EstimationSettings settings = observer_settings(3.5e-3);
   Station station(arm, arm, settings);
   // One frame: 3.5 mrad a body.
   EXPECT_LT(prediction_error(station, 0.5, 3.0), 2e-3);
@@ -127,7 +127,7 @@ TEST(ModelObserver, FindsStiffnessDampingGainAndLoad) {
   real.segments[0].stiffness_nm_per_rad *= 1.15;
   real.segments[1].damping_nms_per_rad *= 0.8;
   real.gravity_mps2 += Eigen::Vector3d(0.1 * 9.81, 0.0, 0.0);
-  Station station(arm, real, settings_of(1e-3));
+  Station station(arm, real, observer_settings(1e-3));
   station.truth.gain.tail(2).setConstant(0.9);
   station.learns = true;
   EXPECT_LT(prediction_error(station, 15.0, 20.0), 6e-4);
@@ -154,7 +154,7 @@ TEST(ModelObserver, FindsStiffnessDampingGainAndLoad) {
 /// that the observer assumes.
 void consistency(int seeds) {
   const ArmParameters arm = test::arm_of(2);
-  EstimationSettings settings = settings_of(3.5e-3);
+  EstimationSettings settings = observer_settings(3.5e-3);
   settings.base_is_fixed = true;
   ModelObserverSettings& model = settings.model_observer;
   model.parameter_deviation = 0.05;  // so small that the errors are linear
@@ -238,7 +238,7 @@ TEST(ModelObserverSlow, IsConsistentOverAHundredSeeds) { consistency(100); }
 /// Frames of an arm at rest: no truth need be stepped, however stiff.
 void holds_still(const ArmParameters& arm) {
   const int n = arm.size();
-  const EstimationSettings settings = settings_of(1e-3);
+  const EstimationSettings settings = observer_settings(1e-3);
   ModelObserver observer(arm, settings, body_noise(settings, n), {.valve_lag_s = kLag_s});
   CurvatureEstimator estimator(settings, arm, body_noise(settings, n));
   FilteredMotion out;
@@ -263,7 +263,7 @@ TEST(ModelObserver, FollowsArmsOfEveryLength) {
       segment.mass_kg = 0.45 / n;
       segment.damping_nms_per_rad = 0.02;
     }
-    Station station(arm, arm, settings_of(3.5e-3), 1, 0.4 / n);
+    Station station(arm, arm, observer_settings(3.5e-3), 1, 0.4 / n);
     station.truth.longest_step_s = n > 3 ? 2e-5 : 1e-4;
     EXPECT_LT(prediction_error(station, 0.2, 0.5), 3e-3) << n;
     EXPECT_TRUE(station.observer.running()) << n;
@@ -276,7 +276,7 @@ TEST(ModelObserver, FollowsPointMasses) {
   // The fastest mode of three point masses is 3.7e5 1/s: the truth is stepped two at a time only.
   ArmParameters arm = test::arm_of(2);
   arm.mass = MassModel::point;
-  Station station(arm, arm, settings_of(3.5e-3));
+  Station station(arm, arm, observer_settings(3.5e-3));
   station.truth.longest_step_s = 5e-5;
   EXPECT_LT(prediction_error(station, 0.3, 0.8), 2e-3);
   for (const int n : {3, 6, 20}) {
@@ -290,7 +290,7 @@ TEST(ModelObserver, CrossesTheStraightPoseAndGoesBeyondPi) {
   ArmParameters arm = test::arm_of(1);
   arm.segments[0].mass_kg = 0.05;
   for (const double amplitude : {0.2, 3.8}) {
-    Station station(arm, arm, settings_of(3.5e-3), 1, amplitude);
+    Station station(arm, arm, observer_settings(3.5e-3), 1, amplitude);
     EXPECT_LT(prediction_error(station, 0.3, 3.0), 6e-3) << amplitude;
     EXPECT_EQ(station.observer.failures(), 0);
   }
@@ -299,13 +299,13 @@ TEST(ModelObserver, CrossesTheStraightPoseAndGoesBeyondPi) {
 TEST(ModelObserver, CoupleActuation) {
   ArmParameters arm = test::arm_of(2);
   arm.actuation = ActuationModel::couple;
-  Station station(arm, arm, settings_of(1e-6), 1, 0.6);
+  Station station(arm, arm, observer_settings(1e-6), 1, 0.6);
   EXPECT_LT(prediction_error(station, 0.3, 1.0), 2e-4);
 }
 
 TEST(ModelObserver, PredictsAnOccludedSegmentForSoManyFrames) {
   const ArmParameters arm = test::arm_of(3);
-  EstimationSettings settings = settings_of(3.5e-3);
+  EstimationSettings settings = observer_settings(3.5e-3);
   settings.predicted_frames = 5;
   Station station(arm, arm, settings);
   station.run(1.0);
@@ -332,7 +332,7 @@ TEST(ModelObserver, PredictsAnOccludedSegmentForSoManyFrames) {
 
 TEST(ModelObserver, LivesThroughSilenceAndStartsAgainAfterASecond) {
   const ArmParameters arm = test::arm_of(3);
-  Station station(arm, arm, settings_of(3.5e-3));
+  Station station(arm, arm, observer_settings(3.5e-3));
   station.run(1.0);
   FilteredMotion before, after;
   station.observer.deviation(before);
@@ -354,7 +354,7 @@ TEST(ModelObserver, LivesThroughSilenceAndStartsAgainAfterASecond) {
 
 TEST(ModelObserver, IgnoresFramesThatAreNotLater) {
   const ArmParameters arm = test::arm_of(2);
-  const EstimationSettings settings = settings_of(3.5e-3);
+  const EstimationSettings settings = observer_settings(3.5e-3);
   Station station(arm, arm, settings);
   station.run(0.5);
   ModelObserver& observer = station.observer;
@@ -375,7 +375,7 @@ TEST(ModelObserver, ParametersStayWithoutAReference) {
   const ArmParameters arm = test::arm_of(2);
   ArmParameters real = arm;
   real.segments[0].stiffness_nm_per_rad *= 1.3;
-  Station station(arm, real, settings_of(3.5e-3));
+  Station station(arm, real, observer_settings(3.5e-3));
   station.run(2.0);
   for (const SegmentCorrection& off : station.observer.correction().segment) {
     EXPECT_EQ(off.stiffness, 0.0);
@@ -386,7 +386,7 @@ TEST(ModelObserver, ParametersStayWithoutAReference) {
 
 TEST(ModelObserver, APushIsASurpriseAndNoiseIsNone) {
   const ArmParameters arm = test::arm_of(3);
-  Station station(arm, arm, settings_of(3.5e-3));
+  Station station(arm, arm, observer_settings(3.5e-3));
   station.learns = true;
   bool surprised = false;
   station.each_frame = [&] { surprised |= station.observer.surprised(); };
@@ -404,7 +404,7 @@ TEST(ModelObserver, APushIsASurpriseAndNoiseIsNone) {
 
 TEST(ModelObserver, FailsIntoSilenceAndStartsAgain) {
   const ArmParameters arm = test::arm_of(2);
-  Station station(arm, arm, settings_of(3.5e-3));
+  Station station(arm, arm, observer_settings(3.5e-3));
   station.run(0.5);
   station.observer.command(station.now_ns,
                            Eigen::VectorXd::Constant(4, std::numeric_limits<double>::quiet_NaN()));
@@ -419,7 +419,7 @@ TEST(ModelObserver, FailsIntoSilenceAndStartsAgain) {
 TEST(ModelObserver, AllocatesNothing) {
   for (const int n : {3, 20, 128}) {
     const ArmParameters arm = test::arm_of(n, 0.33 / n);
-    const EstimationSettings settings = settings_of(3.5e-3);
+    const EstimationSettings settings = observer_settings(3.5e-3);
     ModelObserver observer(arm, settings, body_noise(settings, n), {.valve_lag_s = kLag_s});
     CurvatureEstimator estimator(settings, arm, body_noise(settings, n));
     MocapFrame frame = test::frame_of(arm, Eigen::VectorXd::Constant(2 * n, 0.3 / n));
@@ -449,7 +449,7 @@ TEST(ModelObserver, AllocatesNothing) {
 TEST(ModelObserver, RefusesSettingsThatMeanNothing) {
   const ArmParameters arm = test::arm_of(2);
   const auto refuses = [&](const std::function<void(ModelObserverSettings&)>& change) {
-    EstimationSettings settings = settings_of(1e-3);
+    EstimationSettings settings = observer_settings(1e-3);
     change(settings.model_observer);
     EXPECT_THROW(ModelObserver(arm, settings, body_noise(settings, 2), {}), std::invalid_argument);
   };

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <numbers>
 #include <random>
 
 #include "frames.hpp"
@@ -11,6 +12,7 @@
 namespace softarm {
 namespace {
 
+using std::numbers::pi;
 using test::arm_of;
 using test::frame_of;
 
@@ -217,7 +219,6 @@ TEST_F(StaleBody, LeavesItsSegmentsUnobservedAndIsCounted) {
 
 // About its own axis, by what symmetric marker sets allow, at any bend; before anything was seen.
 TEST_F(StaleBody, ATurnedBodyIsRejectedAtAnyBend) {
-  const double pi = std::acos(-1.0);
   for (const double turn : {pi / 4, pi / 3, pi / 2, 2 * pi / 3, pi, -pi / 2}) {
     for (const double theta : {0.0, 0.4, 1.5, 2.5, 3.1}) {
       for (std::size_t b = 0; b <= kSegments; ++b) {

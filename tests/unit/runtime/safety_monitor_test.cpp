@@ -13,12 +13,12 @@ namespace softarm {
 namespace {
 
 using test::kMs;
-constexpr double kPeriod_s = 0.002;
+constexpr double kTickPeriod_s = 0.002;
 
 /// Steps time by hand: 500 Hz ticks, 200 Hz frames of 5 ms latency unless a test says otherwise.
-class Bench {
+class MonitorBench {
  public:
-  explicit Bench(Arming arming = Arming::automatic, bool readback = false)
+  explicit MonitorBench(Arming arming = Arming::automatic, bool readback = false)
       : monitor(
             [&] {
               SafetySettings settings;
@@ -27,7 +27,7 @@ class Bench {
               settings.valve_readback = readback;
               return settings;
             }(),
-            kPeriod_s) {}
+            kTickPeriod_s) {}
 
   Mode tick(std::int64_t step_ns = 2 * kMs) {
     input.now_ns += step_ns;
@@ -72,7 +72,7 @@ TEST(SafetyMonitor, ThresholdsFollowTheirRule) {
 }
 
 TEST(SafetyMonitor, WaitsForFiftyGoodFramesInARow) {
-  Bench bench;
+  MonitorBench bench;
   bench.input.fully_vented = true;
   bench.run(49);
   EXPECT_EQ(bench.monitor.mode(), Mode::wait_frames);
@@ -83,7 +83,7 @@ TEST(SafetyMonitor, WaitsForFiftyGoodFramesInARow) {
 }
 
 TEST(SafetyMonitor, ExplicitArmingWaitsForTheOperator) {
-  Bench bench(Arming::explicit_);
+  MonitorBench bench(Arming::explicit_);
   bench.input.fully_vented = true;
   EXPECT_EQ(bench.run(200), Mode::wait_frames);
   EXPECT_EQ(bench.monitor.reason(), Reason::waiting_for_arm);
@@ -92,7 +92,7 @@ TEST(SafetyMonitor, ExplicitArmingWaitsForTheOperator) {
 }
 
 TEST(SafetyMonitor, SilenceHoldsThenVentsAndComesBack) {
-  Bench bench;
+  MonitorBench bench;
   bench.activate();
   bench.frames_per_tick = 0;  // the age is 5 ms at the last frame and grows by 2 ms a tick
   EXPECT_EQ(bench.run(7), Mode::active);
@@ -109,7 +109,7 @@ TEST(SafetyMonitor, SilenceHoldsThenVentsAndComesBack) {
 }
 
 TEST(SafetyMonitor, ASoftLimitIsNotForgivenAutomatically) {
-  Bench bench;
+  MonitorBench bench;
   bench.activate();
   bench.input.soft_limit_exceeded = true;
   ASSERT_EQ(bench.tick(), Mode::vent);
@@ -122,7 +122,7 @@ TEST(SafetyMonitor, ASoftLimitIsNotForgivenAutomatically) {
 }
 
 TEST(SafetyMonitor, ArmingIsNotStoredUpForLater) {
-  Bench bench(Arming::explicit_);
+  MonitorBench bench(Arming::explicit_);
   bench.input.fully_vented = true;
   bench.frames_per_tick = 0;
   bench.input.requests.arm = true;
@@ -132,12 +132,12 @@ TEST(SafetyMonitor, ArmingIsNotStoredUpForLater) {
 }
 
 TEST(SafetyMonitor, AnArmingThatWaitsForFramesIsTakenBackByWhatWouldVent) {
-  const std::function<void(Bench&)> causes[] = {
-      [](Bench& bench) { bench.input.sender_restarted = true; },
-      [](Bench& bench) { bench.input.newest_capture_ns = bench.input.now_ns - 3000 * kMs; },
-      [](Bench& bench) { bench.input.deadman_used = true; }};
+  const std::function<void(MonitorBench&)> causes[] = {
+      [](MonitorBench& bench) { bench.input.sender_restarted = true; },
+      [](MonitorBench& bench) { bench.input.newest_capture_ns = bench.input.now_ns - 3000 * kMs; },
+      [](MonitorBench& bench) { bench.input.deadman_used = true; }};
   for (const auto& cause : causes) {
-    Bench bench(Arming::explicit_);
+    MonitorBench bench(Arming::explicit_);
     bench.input.fully_vented = true;
     bench.run(10);
     bench.input.requests.arm = true;
@@ -155,7 +155,7 @@ TEST(SafetyMonitor, AnArmingThatWaitsForFramesIsTakenBackByWhatWouldVent) {
 
 TEST(SafetyMonitor, AnArmThatQueuedUpDuringAStopDoesNotCount) {
   for (const Arming arming : {Arming::explicit_, Arming::automatic}) {
-    Bench bench(arming);
+    MonitorBench bench(arming);
     bench.input.fully_vented = true;
     bench.run(100);
     bench.input.requests.disarm = true;
@@ -173,7 +173,7 @@ TEST(SafetyMonitor, AnArmThatQueuedUpDuringAStopDoesNotCount) {
 }
 
 TEST(SafetyMonitor, HoldEndsAfterFiftyGoodFrames) {
-  Bench bench;
+  MonitorBench bench;
   bench.activate();
   bench.frames_per_tick = 0;
   ASSERT_EQ(bench.run(9), Mode::hold);
@@ -183,7 +183,7 @@ TEST(SafetyMonitor, HoldEndsAfterFiftyGoodFrames) {
 }
 
 TEST(SafetyMonitor, VentTakesTheArmingBack) {
-  Bench bench(Arming::explicit_);
+  MonitorBench bench(Arming::explicit_);
   bench.input.fully_vented = true;
   bench.run(60);
   bench.input.requests.arm = true;
@@ -198,7 +198,7 @@ TEST(SafetyMonitor, VentTakesTheArmingBack) {
 }
 
 TEST(SafetyMonitor, SilentValvesAreALatchedFault) {
-  Bench bench(Arming::automatic, true);
+  MonitorBench bench(Arming::automatic, true);
   bench.activate();
   for (int k = 0; k < 51; ++k) {
     bench.tick();
@@ -218,7 +218,7 @@ TEST(SafetyMonitor, SilentValvesAreALatchedFault) {
 
 /// Stops the daemon for 500 ms. LCM keeps the oldest messages: of the valves' it brings those of
 /// the stop's first 32 ms.
-Mode stop_and_go_on(Bench& bench) {
+Mode stop_and_go_on(MonitorBench& bench) {
   bench.input.newest_measurement_ns = bench.input.now_ns + 32 * kMs;
   bench.input.now_ns += 500 * kMs;
   bench.input.good_frames = 0;
@@ -226,7 +226,7 @@ Mode stop_and_go_on(Bench& bench) {
 }
 
 TEST(SafetyMonitor, WhatTheDaemonCouldNotHearIsNoSilence) {
-  Bench bench(Arming::automatic, true);
+  MonitorBench bench(Arming::automatic, true);
   bench.activate();
   EXPECT_EQ(stop_and_go_on(bench), Mode::vent);
   EXPECT_EQ(bench.monitor.reason(), Reason::time_gap);
@@ -237,7 +237,7 @@ TEST(SafetyMonitor, WhatTheDaemonCouldNotHearIsNoSilence) {
 }
 
 TEST(SafetyMonitor, ValvesThatFellSilentDuringAStopAreNotedAfterIt) {
-  Bench bench(Arming::automatic, true);
+  MonitorBench bench(Arming::automatic, true);
   bench.activate();
   EXPECT_EQ(stop_and_go_on(bench), Mode::vent);
   const std::int64_t heard_ns = bench.input.newest_measurement_ns;
@@ -258,7 +258,7 @@ TEST(SafetyMonitor, ValvesThatFellSilentDuringAStopAreNotedAfterIt) {
   EXPECT_EQ(tick(), Mode::fault) << "where there is pressure";
 
   // One stop after the other does not hide them either.
-  Bench again(Arming::automatic, true);
+  MonitorBench again(Arming::automatic, true);
   again.activate();
   EXPECT_EQ(stop_and_go_on(again), Mode::vent);
   again.input.now_ns += 500 * kMs;
@@ -267,7 +267,7 @@ TEST(SafetyMonitor, ValvesThatFellSilentDuringAStopAreNotedAfterIt) {
 }
 
 TEST(SafetyMonitor, TheMoreSevereCauseWins) {
-  Bench bench;
+  MonitorBench bench;
   bench.activate();
   bench.input.poses_frozen = true;
   bench.input.requests.shutdown = true;
@@ -288,7 +288,7 @@ TEST(SafetyMonitor, RandomSequencesNeverBreakTheInvariants) {
   std::mt19937 random(7);
   const auto chance = [&random](double p) { return std::bernoulli_distribution(p)(random); };
   for (int sequence = 0; sequence < 200; ++sequence) {
-    Bench bench(chance(0.5) ? Arming::automatic : Arming::explicit_);
+    MonitorBench bench(chance(0.5) ? Arming::automatic : Arming::explicit_);
     Mode before = Mode::init;
     for (int k = 0; k < 1000; ++k) {
       if (chance(0.01)) bench.frames_per_tick = 1 - bench.frames_per_tick;

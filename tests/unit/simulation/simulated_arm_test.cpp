@@ -14,7 +14,7 @@ namespace softarm {
 namespace {
 
 using test::kMs;
-constexpr std::int64_t kStart = 987'654'321'012'345;
+constexpr std::int64_t kFirst_ns = 987'654'321'012'345;
 
 PlantSettings sensed_arm() {
   PlantSettings settings = paper_arm();
@@ -34,58 +34,58 @@ PressureCommand hold(std::int64_t sequence, const std::vector<double>& pressures
 TEST(SimulatedArm, IsVentedAndSeesItsFirstFrameAtTheStart) {
   PlantSettings settings = sensed_arm();
   settings.mocap.dropout_probability = 0.0;
-  SimulatedArm arm(settings, kStart);
+  SimulatedArm arm(settings, kFirst_ns);
   MocapFrame frame;
   EXPECT_TRUE(arm.vented());
   EXPECT_EQ(arm.sequence(), CommandExpiry::kNoSequence);
   EXPECT_FALSE(arm.receive(frame));
-  EXPECT_EQ(arm.next_event_ns(), kStart + 5 * kMs);
-  arm.advance_to(kStart + 5 * kMs - 1);
+  EXPECT_EQ(arm.next_event_ns(), kFirst_ns + 5 * kMs);
+  arm.advance_to(kFirst_ns + 5 * kMs - 1);
   EXPECT_FALSE(arm.receive(frame));
-  arm.advance_to(kStart + 5 * kMs);
+  arm.advance_to(kFirst_ns + 5 * kMs);
   ASSERT_TRUE(arm.receive(frame));
   EXPECT_EQ(frame.frame_number, 0);
-  EXPECT_EQ(frame.capture_ns, kStart);
+  EXPECT_EQ(frame.capture_ns, kFirst_ns);
   EXPECT_EQ(frame.segments, 3);
   EXPECT_FALSE(arm.receive(frame));
 }
 
 TEST(SimulatedArm, VentsWhenCommandsStop) {
-  SimulatedArm arm(sensed_arm(), kStart);
+  SimulatedArm arm(sensed_arm(), kFirst_ns);
   const std::vector<double> pressures = drive_bar(1.0);
-  ASSERT_EQ(arm.command(hold(1, pressures), kStart + 10 * kMs), CommandVerdict::in_force);
+  ASSERT_EQ(arm.command(hold(1, pressures), kFirst_ns + 10 * kMs), CommandVerdict::in_force);
   EXPECT_EQ(arm.sequence(), 1);
-  arm.advance_to(kStart + 110 * kMs - 1);
+  arm.advance_to(kFirst_ns + 110 * kMs - 1);
   EXPECT_FALSE(arm.vented());
-  arm.advance_to(kStart + 150 * kMs);
+  arm.advance_to(kFirst_ns + 150 * kMs);
   EXPECT_TRUE(arm.vented());
   // Up for 100 ms, down for 40 ms with a lag of 20 ms, although nothing was called at the expiry.
   for (Eigen::Index i = 0; i < 12; ++i) {
     const double top = pressures[static_cast<std::size_t>(i)] * (1.0 - std::exp(-5.0));
     EXPECT_NEAR(arm.measured_pressures_bar()[i], top * std::exp(-2.0), 1e-9);
   }
-  arm.advance_to(kStart + 8000 * kMs);
+  arm.advance_to(kFirst_ns + 8000 * kMs);
   EXPECT_LT(arm.measured_pressures_bar().maxCoeff(), 1e-12);
   EXPECT_LT(arm.plant().u_rad().norm(), 1e-4);
 }
 
 TEST(SimulatedArm, ShadowAndOldCommandsChangeNothing) {
-  SimulatedArm arm(sensed_arm(), kStart);
-  SimulatedArm same(sensed_arm(), kStart);
+  SimulatedArm arm(sensed_arm(), kFirst_ns);
+  SimulatedArm same(sensed_arm(), kFirst_ns);
   const std::vector<double> pressures = drive_bar(1.0);
   const std::vector<double> others(12, 1.5);
-  arm.command(hold(5, pressures), kStart);
-  same.command(hold(5, pressures), kStart);
+  arm.command(hold(5, pressures), kFirst_ns);
+  same.command(hold(5, pressures), kFirst_ns);
   PressureCommand shadow = hold(6, others);
   shadow.shadow = true;
-  EXPECT_EQ(arm.command(shadow, kStart + 20 * kMs), CommandVerdict::shadow);
-  EXPECT_EQ(arm.command(hold(4, others), kStart + 30 * kMs), CommandVerdict::older);
-  EXPECT_EQ(arm.command(hold(7, std::vector<double>(11, 0.0)), kStart + 30 * kMs),
+  EXPECT_EQ(arm.command(shadow, kFirst_ns + 20 * kMs), CommandVerdict::shadow);
+  EXPECT_EQ(arm.command(hold(4, others), kFirst_ns + 30 * kMs), CommandVerdict::older);
+  EXPECT_EQ(arm.command(hold(7, std::vector<double>(11, 0.0)), kFirst_ns + 30 * kMs),
             CommandVerdict::malformed);
-  same.advance_to(kStart + 20 * kMs);
-  same.advance_to(kStart + 30 * kMs);
-  arm.advance_to(kStart + 90 * kMs);
-  same.advance_to(kStart + 90 * kMs);
+  same.advance_to(kFirst_ns + 20 * kMs);
+  same.advance_to(kFirst_ns + 30 * kMs);
+  arm.advance_to(kFirst_ns + 90 * kMs);
+  same.advance_to(kFirst_ns + 90 * kMs);
   EXPECT_EQ(arm.plant().u_rad(), same.plant().u_rad());
 }
 
@@ -94,11 +94,11 @@ TEST(SimulatedArm, FramesShowTheArmAtTheInstantOfCapture) {
   settings.mocap = {.rate_hz = 240.0, .latency_s = 0.011};
   settings.initial_u_rad.setZero(6);
   settings.initial_u_rad[0] = 0.5;
-  SimulatedArm arm(settings, kStart);
+  SimulatedArm arm(settings, kFirst_ns);
   // Called at times that have nothing to do with the captures.
   std::vector<MocapFrame> frames;
   MocapFrame frame;
-  for (std::int64_t now = kStart; now < kStart + 300 * kMs; now += 7'777'777) {
+  for (std::int64_t now = kFirst_ns; now < kFirst_ns + 300 * kMs; now += 7'777'777) {
     arm.advance_to(now);
     while (arm.receive(frame)) {
       EXPECT_LE(frame.capture_ns + 11 * kMs, now);
@@ -110,7 +110,7 @@ TEST(SimulatedArm, FramesShowTheArmAtTheInstantOfCapture) {
   ArmPlant truth(settings);
   std::vector<Eigen::Isometry3d> ends(3);
   for (const MocapFrame& seen : frames) {
-    truth.advance(to_seconds(seen.capture_ns - kStart));
+    truth.advance(to_seconds(seen.capture_ns - kFirst_ns));
     truth.segment_ends(ends);
     for (std::size_t i = 0; i < 3; ++i) {
       EXPECT_LT((seen.body[i + 1].position_m - ends[i].translation()).norm(), 1e-6);
@@ -122,28 +122,28 @@ TEST(SimulatedArm, FramesShowTheArmAtTheInstantOfCapture) {
 TEST(SimulatedArm, NamesItsNextEvent) {
   PlantSettings settings = sensed_arm();
   settings.mocap = {.rate_hz = 10.0, .latency_s = 0.03};
-  SimulatedArm arm(settings, kStart);
-  EXPECT_EQ(arm.next_event_ns(), kStart + 30 * kMs);  // arrival of the first frame
-  arm.advance_to(kStart + 30 * kMs);
+  SimulatedArm arm(settings, kFirst_ns);
+  EXPECT_EQ(arm.next_event_ns(), kFirst_ns + 30 * kMs);  // arrival of the first frame
+  arm.advance_to(kFirst_ns + 30 * kMs);
   MocapFrame frame;
   ASSERT_TRUE(arm.receive(frame));
-  EXPECT_EQ(arm.next_event_ns(), kStart + 100 * kMs);  // next capture
+  EXPECT_EQ(arm.next_event_ns(), kFirst_ns + 100 * kMs);  // next capture
   const std::vector<double> pressures(12, 0.1);
   PressureCommand command = hold(1, pressures);
   command.validity_ns = 40 * kMs;
-  arm.command(command, kStart + 40 * kMs);
-  EXPECT_EQ(arm.next_event_ns(), kStart + 80 * kMs);  // expiry
+  arm.command(command, kFirst_ns + 40 * kMs);
+  EXPECT_EQ(arm.next_event_ns(), kFirst_ns + 80 * kMs);  // expiry
 }
 
 TEST(SimulatedArm, TimeDoesNotGoBack) {
-  SimulatedArm arm(sensed_arm(), kStart);
-  arm.advance_to(kStart + 50 * kMs);
+  SimulatedArm arm(sensed_arm(), kFirst_ns);
+  arm.advance_to(kFirst_ns + 50 * kMs);
   const SegmentVector u = arm.plant().u_rad();
-  arm.advance_to(kStart + 20 * kMs);
-  EXPECT_EQ(arm.time_ns(), kStart + 50 * kMs);
+  arm.advance_to(kFirst_ns + 20 * kMs);
+  EXPECT_EQ(arm.time_ns(), kFirst_ns + 50 * kMs);
   const std::vector<double> pressures(12, 0.1);
-  EXPECT_EQ(arm.command(hold(1, pressures), kStart + 49 * kMs), CommandVerdict::in_force);
-  arm.advance_to(kStart + 150 * kMs - 1);  // valid for 100 ms from when it was taken
+  EXPECT_EQ(arm.command(hold(1, pressures), kFirst_ns + 49 * kMs), CommandVerdict::in_force);
+  arm.advance_to(kFirst_ns + 150 * kMs - 1);  // valid for 100 ms from when it was taken
   EXPECT_FALSE(arm.vented());
   EXPECT_EQ(u.size(), 6);
 }
