@@ -33,10 +33,24 @@ static void describe(Keys& key, MocapSettings& it) {
 
 static void describe(Keys& key, ValveSettings& it) {
   KEY(lag_s, from(0, 10), "time constant; 0: the command is the pressure");
+  KEY(vent_lag_s, from(0, 10), "the same where a pressure falls; 0: lag_s");
   KEY(supply_pressure_bar, above(0, 1e4), "highest; left out: actuation.max_pressure_bar");
   KEY(dead_time_s, from(0, 10), "from a command's arrival until the valves begin to act");
   KEY(slew_bar_per_s, from(0, 1e9), "largest rate of a real pressure; 0: no limit");
   KEY(resolution_bar, from(0, 100), "set points are rounded to its multiples; 0: exact");
+  KEY(play_bar, from(0, 100), "half the backlash between set point and pressure");
+  KEY(dead_band_bar, from(0, 100), "set points that move the valve by less do nothing");
+}
+
+static void describe(Keys& key, MaterialSettings& it) {
+  KEY(hysteresis, from(0, 1), "part of every pressure that acts through play operators");
+  KEY(play_bar, from(0, 100), "half widths of these operators, in equal shares");
+  KEY(cubic_per_rad2, from(0, 100), "K u becomes K u (1 + cubic |u|^2)");
+  KEY(stiffening_per_bar, from(0, 100),
+      "K becomes K (1 + stiffening p), p the sum over the segment's chambers");
+  KEY(remanence, from(0, 100),
+      "a Maxwell element beside K, in parts of K: bent, the arm stays bent");
+  KEY(remanence_s, from(1e-3, 1e6), "time constant of its relaxation");
 }
 
 static void describe(Keys& key, ExternalLoad& it) {
@@ -121,6 +135,7 @@ void describe_plant(Keys& key, Experiment& experiment) {
   key.section({"actuation", "keys of `actuation` that differ here", kOptional, SectionKind::hint},
               [&] { describe_actuation(key, it.actuation, kOptional); });
   KEY(valves, "between commanded and real pressure (or torque, then in N m)");
+  KEY(material, "how the body differs from a linear spring and damper");
   KEY(mocap, "simulated motion capture");
   key.section({"initial", "where the arm starts, at rest"}, [&] {
     std::vector<double> u(it.initial_u_rad.begin(), it.initial_u_rad.end());

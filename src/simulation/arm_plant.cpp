@@ -9,10 +9,14 @@
 
 #include "simulation/integrator.hpp"
 #include "softarm/actuation/input_map.hpp"
+#include "softarm/simulation/chamber_hysteresis.hpp"
 #include "softarm/simulation/plant_system.hpp"
 
 namespace softarm {
 namespace {
+
+/// What a material remembers is updated so often; relaxation takes seconds.
+constexpr double kMemoryStep_s = 1e-3;
 
 void expect(bool holds, const std::string& expected, const std::string& got) {
   if (!holds) {
@@ -37,6 +41,16 @@ const PlantSettings& checked(const PlantSettings& settings) {
   for (const double payload : settings.payload_kg) {
     expect(std::isfinite(payload) && payload >= 0.0, "payloads >= 0 kg", std::to_string(payload));
   }
+  const MaterialSettings& material = settings.material;
+  expect(material.hysteresis >= 0.0 && material.hysteresis <= 1.0, "a part in material.hysteresis",
+         std::to_string(material.hysteresis));
+  for (const double width : material.play_bar)
+    expect(std::isfinite(width) && width >= 0.0, "material.play_bar >= 0", std::to_string(width));
+  for (const double term :
+       {material.cubic_per_rad2, material.stiffening_per_bar, material.remanence})
+    expect(std::isfinite(term) && term >= 0.0, "terms of material >= 0", std::to_string(term));
+  expect(material.remanence == 0.0 || material.remanence_s > 0.0, "material.remanence_s > 0 s",
+         std::to_string(material.remanence_s));
   expect(settings.arm.gravity_mps2.allFinite(), "finite gravity", "another");
   for (const SegmentParameters& segment : settings.arm.segments) {
     expect(std::isfinite(segment.length_m) && segment.length_m > 0.0, "lengths > 0 m",
@@ -86,6 +100,9 @@ struct ArmPlant::Implementation {
         dead_time_s(settings.valves.dead_time_s),
         valves(settings.valves, chamber_count(settings.actuation),
                settings.actuation.kind == ActuationKind::torque),
+        hysteresis(settings.material.hysteresis, settings.material.play_bar, valves.size()),
+        follows_valves(!valves.exponential() || hysteresis.active() ||
+                       settings.material.stiffening_per_bar != 0.0),
         map(input_map(settings.actuation, settings.arm.extensible)),
         system(settings.kind.make(settings)),
         integrator(make_integrator(*system, integrator_settings(settings))),
@@ -105,8 +122,8 @@ struct ArmPlant::Implementation {
 
   /// Passes what the valves will do from now on to the equation of motion.
   void drive() {
-    if (valves.slewed()) {
-      system->input().follow(integrator->time_s(), valves, map);
+    if (follows_valves) {
+      system->input().follow(integrator->time_s(), valves, hysteresis, map);
     } else {
       present_nm.noalias() = map * valves.pressures_bar();
       target_nm.noalias() = map * valves.commanded_bar();
@@ -148,6 +165,8 @@ struct ArmPlant::Implementation {
   double lag_s;
   double dead_time_s;
   Valves valves;
+  ChamberHysteresis hysteresis;
+  bool follows_valves;  // the force is not one exponential
   Eigen::MatrixXd map;
   std::unique_ptr<PlantSystem> system;
   std::unique_ptr<Integrator> integrator;
@@ -183,9 +202,12 @@ void ArmPlant::advance(double t_end_s) {
   Implementation& self = *implementation_;
   while (t_end_s > self.integrator->time_s()) {
     const double from_s = self.integrator->time_s();
-    const double to_s = std::min(t_end_s, self.next_event_s());
+    double to_s = std::min(t_end_s, self.next_event_s());
+    if (self.system->remembers()) to_s = std::min(to_s, from_s + kMemoryStep_s);
     self.integrator->advance(to_s);
     self.valves.advance(to_s - from_s);
+    self.hysteresis.remember(self.valves.pressures_bar());
+    if (self.system->remembers()) self.system->remember(to_s - from_s, self.integrator->x());
     self.meet_events();
     self.drive();
   }
@@ -208,6 +230,7 @@ void ArmPlant::reset(ConstVectorRef u_rad, ConstVectorRef velocity_radps,
   expect(u_rad.allFinite() && velocity_radps.allFinite(), "a finite state", "another");
   self.pending.clear();
   self.valves.reset(pressure_bar);
+  self.hysteresis.remember(self.valves.pressures_bar());
   self.drive();
   Eigen::VectorXd x(self.system->size());
   Eigen::VectorXd v(self.system->size());

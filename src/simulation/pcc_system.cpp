@@ -15,7 +15,7 @@ std::unique_ptr<PlantSystem> PccSettings::make(const PlantSettings& settings) co
 }
 
 PccSystem::PccSystem(const PlantSettings& settings, const ArmParameters& arm, int pieces)
-    : PlantSystem(settings, pieces == 1),
+    : PlantSystem(settings, pieces == 1, pieces == 1),
       segments_(settings.arm.size()),
       pieces_(pieces),
       width_(arm.segment_dof()),
@@ -23,12 +23,25 @@ PccSystem::PccSystem(const PlantSettings& settings, const ArmParameters& arm, in
       share_(arm_.size()),
       gravity_mps2_(arm_.gravity_mps2),
       loads_(arm_, pieces_, settings.payload_kg),
+      material_(settings.material),
+      bends_otherwise_(material_.bends_otherwise()),
       workspace_(arm_),
       piece_ends_(static_cast<std::size_t>(arm_.size())) {
   const Eigen::Index n = arm_.dof();
   for (Eigen::VectorXd* vector : {&stiffness_, &damping_, &shifted_, &above_, &below_, &sum_}) {
     vector->setZero(n);
   }
+  if (material_.stiffening_per_bar != 0.0) {
+    segment_sum_.setZero(segments_, chamber_count(settings.actuation));
+    Eigen::Index chamber = 0;
+    for (int i = 0; i < segments_; ++i) {
+      const auto count = static_cast<Eigen::Index>(
+          settings.actuation.segments[static_cast<std::size_t>(i)].size());
+      segment_sum_.block(i, chamber, 1, count).setOnes();
+      chamber += count;
+    }
+  }
+  if (remembers()) relaxed_rad_.setZero(2 * segments_);
   coriolis_.setZero(n, n);
   inertia_.setZero(n, n);
   const Eigen::VectorXd zero = Eigen::VectorXd::Zero(n), one = Eigen::VectorXd::Ones(n);
@@ -54,6 +67,35 @@ void PccSystem::add_couple(const Eigen::Vector2d& tau_nm, int first_piece, Const
     out.segment<2>(2 * j) += segment_angular_jacobian(bend).transpose() * local;
     local = segment_rotation(bend).transpose() * local;
   }
+}
+
+void PccSystem::add_material(double t_s, ConstVector u, Vector out) {
+  if (material_.stiffening_per_bar != 0.0)
+    pressure_sum_bar_.noalias() = segment_sum_ * input_.pressures_bar(t_s);
+  for (int i = 0; i < segments_; ++i) {
+    const auto bend = u.segment<2>(width_ * i);
+    const double k = arm_.segments[static_cast<std::size_t>(i)].stiffness_nm_per_rad;
+    if (material_.stiffening_per_bar != 0.0)
+      out.segment<2>(width_ * i) -= k * material_.stiffening_per_bar * pressure_sum_bar_[i] * bend;
+    if (remembers())
+      out.segment<2>(width_ * i) -=
+          k * material_.remanence * (bend - relaxed_rad_.segment<2>(2 * i));
+  }
+}
+
+void PccSystem::add_cubic(ConstVector u, Vector out) const {
+  for (int i = 0; i < segments_; ++i) {
+    const Eigen::Vector2d bend = u.segment<2>(width_ * i);
+    out.segment<2>(width_ * i) += arm_.segments[static_cast<std::size_t>(i)].stiffness_nm_per_rad *
+                                  material_.cubic_per_rad2 * bend.squaredNorm() * bend;
+  }
+}
+
+void PccSystem::remember(double passed_s, ConstVector u) {
+  const double moved = -std::expm1(-passed_s / material_.remanence_s);
+  for (int i = 0; i < segments_; ++i)
+    relaxed_rad_.segment<2>(2 * i) +=
+        moved * (u.segment<2>(width_ * i) - relaxed_rad_.segment<2>(2 * i));
 }
 
 double PccSystem::unit(Eigen::Index i) const {
@@ -99,12 +141,14 @@ void PccSystem::residual(double t_s, ConstVector u, ConstVector velocity, ConstV
                          Vector out) {
   sum_.setZero();
   add_input(t_s, u, sum_);
+  if (bends_otherwise_) add_material(t_s, u, sum_);
   feel_base(t_s);
   inverse_dynamics(arm_, workspace_, u, velocity, velocity, acceleration, {}, out);
   if (loads_.has_payload()) {
     loads_.add_payload(u, velocity, acceleration, arm_.gravity_mps2, out);
   }
   out += stiffness_.cwiseProduct(u) + damping_.cwiseProduct(velocity) - sum_;
+  if (bends_otherwise_) add_cubic(u, out);
   if (!arm_.extensible) return;
   for (const Eigen::Index e : held_) out[e] = acceleration[e];
   if (!has_lengths(u)) out.setConstant(std::numeric_limits<double>::quiet_NaN());
@@ -122,6 +166,12 @@ bool PccSystem::acceleration(double t_s, ConstVector u, ConstVector velocity, Ve
   }
   sum_.setZero();
   add_input(t_s, u, sum_);
+  if (bends_otherwise_) {
+    below_.setZero();
+    add_cubic(u, below_);
+    sum_ -= below_;
+    add_material(t_s, u, sum_);
+  }
   feel_base(t_s);
   return forward_dynamics(arm_, workspace_, u, velocity, sum_, out);
 }
@@ -154,6 +204,7 @@ void PccSystem::linearize(double t_s, ConstVector u, ConstVector velocity, Const
 SecondOrderSystem::Powers PccSystem::powers(double t_s, ConstVector u, ConstVector velocity) {
   sum_.setZero();
   add_input(t_s, u, sum_);
+  if (bends_otherwise_) add_material(t_s, u, sum_);
   if (external_loads_.base_moves()) {
     // Inertia forces of the base's acceleration, the only weight in this.
     arm_.gravity_mps2 = -external_loads_.base_acceleration_mps2(t_s);
@@ -173,7 +224,17 @@ double PccSystem::kinetic_energy_j(ConstVector u, ConstVector velocity) {
 double PccSystem::potential_energy_j(ConstVector u) {
   arm_.gravity_mps2 = gravity_mps2_;
   return gravity_potential(arm_, u) + loads_.potential_energy_j(u) +
-         0.5 * u.dot(stiffness_.cwiseProduct(u));
+         0.5 * u.dot(stiffness_.cwiseProduct(u)) + cubic_energy_j(u);
+}
+
+double PccSystem::cubic_energy_j(ConstVector u) const {
+  if (material_.cubic_per_rad2 == 0.0) return 0.0;
+  double sum = 0.0;
+  for (int i = 0; i < segments_; ++i) {
+    const double bend2 = u.segment<2>(width_ * i).squaredNorm();
+    sum += arm_.segments[static_cast<std::size_t>(i)].stiffness_nm_per_rad * bend2 * bend2;
+  }
+  return 0.25 * material_.cubic_per_rad2 * sum;
 }
 
 void PccSystem::spread(ConstVector u, Vector x) const {

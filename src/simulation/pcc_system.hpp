@@ -13,7 +13,8 @@ namespace softarm {
 
 /// r = B u'' + C u' + D u' + G + K u - A tau_A(t) - J' f_ext, where u are the curvatures of all
 /// pieces: the kinds pcc and refined. Of an arm that is extensible, one piece a segment, (u, e); r is
-/// NaN where a segment would have no length left. The moment of a segment's chambers follows
+/// NaN where a segment would have no length left. `MaterialSettings` add to K u of one-piece segments;
+/// what relaxes is held while a step is made. The moment of a segment's chambers follows
 /// the body and acts on each of its pieces alike; the paper's couple has fixed axes, those of the
 /// segment's start, and acts between there and the segment's end.
 class PccSystem final : public PlantSystem {
@@ -36,6 +37,8 @@ class PccSystem final : public PlantSystem {
   void segment_ends(ConstVector x, std::span<Eigen::Isometry3d> ends) const override;
   void curvature(ConstVector x, ConstVector v, Vector u, Vector rate) const override;
   PlantShape shape(ConstVector x) const override { return arcs(arm_, x); }
+  bool remembers() const override { return material_.remanence > 0.0; }
+  void remember(double passed_s, ConstVector u) override;
 
  private:
   /// A base that accelerates is gravity the other way.
@@ -44,6 +47,11 @@ class PccSystem final : public PlantSystem {
   void add_input(double t_s, ConstVector u, Vector out);
   void add_couple(const Eigen::Vector2d& tau_nm, int first_piece, ConstVector u, Vector out) const;
   bool has_lengths(ConstVector u) const;
+  /// out -= what the material adds to K u, but for its cubic part: work done on the arm.
+  void add_material(double t_s, ConstVector u, Vector out);
+  /// out += K cubic |u|^2 u.
+  void add_cubic(ConstVector u, Vector out) const;
+  double cubic_energy_j(ConstVector u) const;
 
   int segments_;
   int pieces_;                      // a segment
@@ -53,6 +61,10 @@ class PccSystem final : public PlantSystem {
   Eigen::VectorXd share_;           // of a segment's bend under a uniform moment, one a piece
   Eigen::Vector3d gravity_mps2_;    // without the base's acceleration
   PccLoads loads_;
+  MaterialSettings material_;
+  bool bends_otherwise_;
+  Eigen::MatrixXd segment_sum_;  // n x chambers, ones where a chamber is the segment's
+  Eigen::VectorXd pressure_sum_bar_, relaxed_rad_;
   DynamicsWorkspace workspace_;
   Eigen::VectorXd stiffness_, damping_;            // diagonals of K and D
   Eigen::VectorXd shifted_, above_, below_, sum_;  // scratch

@@ -30,11 +30,16 @@ void differences(const Eigen::VectorXd& x, double step, const Function& function
 
 }  // namespace
 
-PlantSystem::PlantSystem(const PlantSettings& settings, bool stretches)
+PlantSystem::PlantSystem(const PlantSettings& settings, bool stretches, bool bends_otherwise)
     : input_(settings.arm.dof()), external_loads_(settings), segments_arm_(settings.arm) {
   if (settings.arm.extensible && !stretches) {
     throw std::invalid_argument(std::string("plant.arm.extensible: expected false for kind ") +
                                 settings.kind.name() + ", got true");
+  }
+  if (settings.material.bends_otherwise() && !bends_otherwise) {
+    throw std::invalid_argument(
+        std::string("plant.material: expected nothing but hysteresis for kind ") +
+        settings.kind.name() + ", got cubic, stiffening or remanence");
   }
 }
 

@@ -5,6 +5,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "softarm/actuation/play.hpp"
+
 namespace softarm {
 namespace {
 
@@ -20,10 +22,13 @@ int checked_count(int chambers) {
 
 Valves::Valves(const ValveSettings& settings, int chambers, bool both_signs)
     : lag_s_(settings.lag_s),
+      vent_lag_s_(settings.vent_lag_s == 0.0 ? settings.lag_s : settings.vent_lag_s),
       supply_bar_(settings.supply_pressure_bar),
       lowest_bar_(both_signs ? -settings.supply_pressure_bar : 0.0),
       slew_bar_per_s_(settings.slew_bar_per_s),
       resolution_bar_(settings.resolution_bar),
+      play_bar_(settings.play_bar),
+      dead_band_bar_(settings.dead_band_bar),
       pressure_bar_(Eigen::VectorXd::Zero(checked_count(chambers))),
       command_bar_(Eigen::VectorXd::Zero(chambers)) {
   const auto expect = [](double value, const char* key, const char* what) {
@@ -33,10 +38,13 @@ Valves::Valves(const ValveSettings& settings, int chambers, bool both_signs)
     }
   };
   expect(lag_s_, "lag_s", "time");
+  expect(vent_lag_s_, "vent_lag_s", "time");
   expect(supply_bar_, "supply_pressure_bar", "pressure");
   expect(settings.dead_time_s, "dead_time_s", "time");
   expect(slew_bar_per_s_, "slew_bar_per_s", "rate");
   expect(resolution_bar_, "resolution_bar", "pressure");
+  expect(play_bar_, "play_bar", "pressure");
+  expect(dead_band_bar_, "dead_band_bar", "pressure");
 }
 
 void Valves::command(std::span<const double> command_bar) noexcept {
@@ -46,19 +54,20 @@ void Valves::command(std::span<const double> command_bar) noexcept {
     if (resolution_bar_ > 0.0 && std::isfinite(wanted)) {
       wanted = resolution_bar_ * std::round(wanted / resolution_bar_);
     }
-    command_bar_[static_cast<Eigen::Index>(i)] = std::clamp(wanted, lowest_bar_, supply_bar_);
+    double& aim = command_bar_[static_cast<Eigen::Index>(i)];
+    wanted = play(aim, std::clamp(wanted, lowest_bar_, supply_bar_), play_bar_);
+    if (std::abs(wanted - aim) >= dead_band_bar_) aim = wanted;
   }
-  if (lag_s_ == 0.0 && !slewed()) {
-    pressure_bar_ = command_bar_;
-  }
+  if (lag_s_ == 0.0 && exponential()) pressure_bar_ = command_bar_;
 }
 
 void Valves::after(double ahead_s, Eigen::Ref<Eigen::VectorXd> out) const noexcept {
   for (Eigen::Index i = 0; i < pressure_bar_.size(); ++i) {
     double gap = command_bar_[i] - pressure_bar_[i];
     double left_s = ahead_s;
-    if (slewed()) {
-      const double steep = std::abs(gap) - slew_bar_per_s_ * lag_s_;  // to go on a straight line
+    const double lag_s = gap < 0.0 ? vent_lag_s_ : lag_s_;
+    if (slew_bar_per_s_ > 0.0) {
+      const double steep = std::abs(gap) - slew_bar_per_s_ * lag_s;  // to go on a straight line
       if (steep > 0.0) {
         const double ramp_s = std::min(steep / slew_bar_per_s_, left_s);
         gap -= std::copysign(slew_bar_per_s_ * ramp_s, gap);
@@ -66,12 +75,13 @@ void Valves::after(double ahead_s, Eigen::Ref<Eigen::VectorXd> out) const noexce
       }
     }
     // A line that ends at the command itself (no lag) ends there exactly.
-    out[i] = command_bar_[i] - (left_s > 0.0 ? gap * remaining(left_s) : gap);
+    out[i] = command_bar_[i] -
+             (left_s > 0.0 ? (lag_s == 0.0 ? 0.0 : gap * std::exp(-left_s / lag_s)) : gap);
   }
 }
 
 void Valves::advance(double step_s) noexcept {
-  if (slewed()) {
+  if (!exponential()) {
     after(step_s, pressure_bar_);
     return;
   }
@@ -83,12 +93,12 @@ void Valves::advance(double step_s) noexcept {
 }
 
 void Valves::reset(std::span<const double> pressure_bar) noexcept {
-  command(pressure_bar);
+  const std::size_t count = std::min(pressure_bar.size(), static_cast<std::size_t>(size()));
+  for (std::size_t i = 0; i < count; ++i) {
+    command_bar_[static_cast<Eigen::Index>(i)] =
+        std::isnan(pressure_bar[i]) ? 0.0 : std::clamp(pressure_bar[i], lowest_bar_, supply_bar_);
+  }
   pressure_bar_ = command_bar_;
-}
-
-double Valves::remaining(double ahead_s) const noexcept {
-  return lag_s_ == 0.0 ? 0.0 : std::exp(-ahead_s / lag_s_);
 }
 
 }  // namespace softarm

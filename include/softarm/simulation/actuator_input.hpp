@@ -8,6 +8,7 @@
 
 namespace softarm {
 
+class ChamberHysteresis;
 class Valves;
 
 /// The generalized force A_chamber tau_A of every segment (2n, N m; 3n with the axial forces in N
@@ -30,9 +31,16 @@ class ActuatorInput {
     known_ = false;
   }
 
-  /// From t_s on: `map` times the pressures that `valves`, as they stand then, come to. Both
-  /// outlive this and do not change until the next call.
-  void follow(double t_s, const Valves& valves, const Eigen::MatrixXd& map);
+  /// From t_s on: `map` times the pressures that `valves`, as they stand then, come to, as they act
+  /// behind `hysteresis`. All outlive this and do not change until the next call.
+  void follow(double t_s, const Valves& valves, const ChamberHysteresis& hysteresis,
+              const Eigen::MatrixXd& map);
+
+  /// The chambers' pressures (bar), if it follows valves.
+  const Eigen::VectorXd& pressures_bar(double t_s) {
+    if (valves_ != nullptr) force_of_valves_nm(t_s);
+    return pressures_bar_;
+  }
 
   const Eigen::VectorXd& force_nm(double t_s) {
     if (valves_ != nullptr) return force_of_valves_nm(t_s);
@@ -58,9 +66,10 @@ class ActuatorInput {
 
   Eigen::VectorXd target_nm_, excess_nm_;
   Eigen::VectorXd force_nm_;        // at time_s_
-  const Valves* valves_ = nullptr;  // where they have a slew limit
+  const Valves* valves_ = nullptr;  // where they are not one exponential
+  const ChamberHysteresis* hysteresis_ = nullptr;
   const Eigen::MatrixXd* map_ = nullptr;
-  Eigen::VectorXd pressures_bar_;
+  Eigen::VectorXd pressures_bar_, acting_bar_;
   double since_s_ = 0.0;
   double rate_per_s_ = 0.0;  // 1 / lag, or 0 for a force that does not change
   double time_s_ = 0.0;

@@ -33,7 +33,9 @@ class PlantSystem : public SecondOrderSystem {
  public:
   /// @param stretches whether the kind simulates an arm that is `extensible`.
   /// @throw std::invalid_argument for such an arm where it does not.
-  explicit PlantSystem(const PlantSettings& settings, bool stretches = false);
+  /// @param bends_otherwise whether it simulates what `MaterialSettings` adds to K u; the same throw.
+  explicit PlantSystem(const PlantSettings& settings, bool stretches = false,
+                       bool bends_otherwise = false);
 
   /// Of gravity (zero at the world's origin) and bending.
   virtual double potential_energy_j(ConstVector x) = 0;
@@ -52,6 +54,11 @@ class PlantSystem : public SecondOrderSystem {
   virtual void curvature(ConstVector x, ConstVector v, Vector u, Vector rate) const;
   /// Of the PCC arm of these u.
   virtual PlantShape shape(ConstVector x) const;
+
+  /// Whether it has states that `remember` moves on: relaxation, slow beside a motion.
+  virtual bool remembers() const { return false; }
+  /// Time has passed and led to x.
+  virtual void remember(double /*passed_s*/, ConstVector /*x*/) {}
 
   /// From t_s on the actuators make the generalized force (`ActuatorInput`) target + (present - target) exp(-(t - t_s) / lag_s); lag 0: target.
   void drive(double t_s, ConstVector present_nm, ConstVector target_nm, double lag_s) {

@@ -18,8 +18,31 @@ struct ValveSettings {
   double lag_s = 0.0;
   double supply_pressure_bar = 2.0;
   double dead_time_s = 0.0;
+  double vent_lag_s = 0.0;  ///< where a pressure falls; 0: `lag_s`
   double slew_bar_per_s = 0.0;
   double resolution_bar = 0.0;
+  double play_bar = 0.0;       ///< half the backlash between set point and what the valve aims at
+  double dead_band_bar = 0.0;  ///< set points nearer to what the valve aims at do nothing
+};
+
+/// How the body of an arm differs from a linear spring and damper. Left out, it costs nothing.
+struct MaterialSettings {
+  /// Part of every pressure that acts on the arm through play operators (Prandtl-Ishlinskii) of
+  /// these half widths, in equal shares: loops between pressure and moment.
+  double hysteresis = 0.0;
+  std::vector<double> play_bar = {0.02, 0.05, 0.1};
+  double cubic_per_rad2 = 0.0;  ///< K u becomes K u (1 + cubic |u|^2)
+  double stiffening_per_bar =
+      0.0;  ///< K becomes K (1 + stiffening sum p) by the segment's pressures
+  /// A Maxwell element beside K: the moment remanence K (u - z) with z' = (u - z) / remanence_s. An
+  /// arm that was held bent comes back bent.
+  double remanence = 0.0;
+  double remanence_s = 10.0;
+
+  /// The moment depends on more than u, u' and pressures behind valves.
+  bool bends_otherwise() const {
+    return cubic_per_rad2 != 0.0 || stiffening_per_bar != 0.0 || remanence != 0.0;
+  }
 };
 
 /// Simulated motion capture.
@@ -63,6 +86,7 @@ struct PlantSettings {
   ArmParameters arm;
   ActuationSettings actuation;
   ValveSettings valves;
+  MaterialSettings material;
   MocapSettings mocap;
   /// At rest. Where a segment has several parts, each takes its share, as under a uniform moment.
   SegmentVector initial_u_rad;

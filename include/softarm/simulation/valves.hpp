@@ -14,9 +14,10 @@ namespace softarm {
 ///
 /// While a command is held the pressure is known in closed form, p(t) = c + (p(0) - c) exp(-t /
 /// lag): stepping is exact for any step, and an integrator may ask for the pressure at any time
-/// ahead. Lag 0 is the ideal valve. A slew limit, if any, first lets the pressure rise (or fall) on
-/// a straight line until the lag alone is slower; a resolution rounds what is commanded. Dead time
-/// is not theirs: see ArmPlant.
+/// ahead. Lag 0 is the ideal valve; a chamber may vent with another lag than it fills. A slew
+/// limit, if any, first lets the pressure rise (or fall) on a straight line until the lag alone is
+/// slower; a resolution rounds what is commanded; play (backlash) and a dead band lie between that
+/// and what the valve aims at. Dead time is not theirs: see ArmPlant.
 class Valves {
  public:
   /// @param chambers number of valves, >= 0. All start at 0 bar with 0 bar commanded.
@@ -42,24 +43,20 @@ class Valves {
   /// What the pressures will be `ahead_s` >= 0 from now if the command is held; `out` has `size()`.
   void after(double ahead_s, Eigen::Ref<Eigen::VectorXd> out) const noexcept;
 
-  /// Whether a slew limit is in force: then pressures are not exponentials of time.
-  bool slewed() const noexcept { return slew_bar_per_s_ > 0.0; }
-
-  /// exp(-ahead / lag): what is left after `ahead_s` of the difference between pressure and command
-  /// (0 with lag 0).
-  double remaining(double ahead_s) const noexcept;
+  /// Whether all pressures are the same exponential of time, as they are without a slew limit and
+  /// with one lag.
+  bool exponential() const noexcept { return slew_bar_per_s_ == 0.0 && vent_lag_s_ == lag_s_; }
 
   const Eigen::VectorXd& pressures_bar() const noexcept { return pressure_bar_; }  ///< real, now
-  const Eigen::VectorXd& commanded_bar() const noexcept {
-    return command_bar_;
-  }  ///< within the supply
+  /// What the valves aim at, within the supply.
+  const Eigen::VectorXd& commanded_bar() const noexcept { return command_bar_; }
 
  private:
-  double lag_s_;
+  double lag_s_, vent_lag_s_;
   double supply_bar_;
   double lowest_bar_;
   double slew_bar_per_s_;
-  double resolution_bar_;
+  double resolution_bar_, play_bar_, dead_band_bar_;
   Eigen::VectorXd pressure_bar_;
   Eigen::VectorXd command_bar_;
 };

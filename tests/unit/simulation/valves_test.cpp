@@ -30,17 +30,16 @@ TEST(Valves, StepsOfAnySizeLeadToTheSamePressure) {
   for (int k = 0; k < 50000; ++k) often.advance(1e-6);
   EXPECT_NEAR(once.pressures_bar()[0], often.pressures_bar()[0], 1e-12);
   // What an integrator looks ahead to is where the valve then is.
-  const double ahead = once.commanded_bar()[0] +
-                       once.remaining(0.01) * (once.pressures_bar()[0] - once.commanded_bar()[0]);
+  Eigen::VectorXd ahead(1);
+  once.after(0.01, ahead);
   once.advance(0.01);
-  EXPECT_NEAR(once.pressures_bar()[0], ahead, 1e-15);
+  EXPECT_NEAR(once.pressures_bar()[0], ahead[0], 1e-15);
 }
 
 TEST(Valves, WithoutLagTheCommandIsThePressure) {
   Valves valves({.lag_s = 0.0, .supply_pressure_bar = 2.0}, 1);
   valves.command(std::array{0.7});
   EXPECT_EQ(valves.pressures_bar()[0], 0.7);
-  EXPECT_EQ(valves.remaining(1e-9), 0.0);
 }
 
 TEST(Valves, NeverLeaveTheSupply) {
@@ -54,6 +53,36 @@ TEST(Valves, NeverLeaveTheSupply) {
   EXPECT_NEAR(valves.pressures_bar()[0], 2.0, 1e-12);
   EXPECT_EQ(valves.pressures_bar()[1], 0.0);
   EXPECT_EQ(valves.pressures_bar()[2], 0.0);
+}
+
+TEST(Valves, VentWithALagOfTheirOwn) {
+  Valves valves({.lag_s = 0.6, .supply_pressure_bar = 2.0, .vent_lag_s = 1.5}, 1);
+  EXPECT_FALSE(valves.exponential());
+  valves.command(std::array{1.0});
+  for (int k = 0; k < 300; ++k) valves.advance(0.01);
+  const double top = 1.0 - std::exp(-3.0 / 0.6);
+  EXPECT_NEAR(valves.pressures_bar()[0], top, 1e-13);
+  valves.command(std::array{0.2});
+  for (int k = 0; k < 150; ++k) valves.advance(0.01);
+  EXPECT_NEAR(valves.pressures_bar()[0], 0.2 + (top - 0.2) * std::exp(-1.0), 1e-13);
+}
+
+TEST(Valves, BacklashAndDeadBandLieBetweenSetPointAndAim) {
+  Valves valves({.supply_pressure_bar = 2.0, .play_bar = 0.05}, 1);
+  const auto at = [&](double bar) {
+    valves.command(std::array{bar});
+    return valves.pressures_bar()[0];
+  };
+  EXPECT_NEAR(at(1.0), 0.95, 1e-15);
+  EXPECT_NEAR(at(0.92), 0.95, 1e-15) << "within the backlash";
+  EXPECT_NEAR(at(0.5), 0.55, 1e-15);
+  EXPECT_NEAR(at(1.0), 0.95, 1e-15);
+  Valves lazy({.supply_pressure_bar = 2.0, .dead_band_bar = 0.05}, 1);
+  lazy.command(std::array{1.0});
+  lazy.command(std::array{1.04});
+  EXPECT_EQ(lazy.pressures_bar()[0], 1.0);
+  lazy.command(std::array{1.06});
+  EXPECT_EQ(lazy.pressures_bar()[0], 1.06);
 }
 
 TEST(Valves, RefuseSettingsThatMeanNothing) {
