@@ -55,7 +55,7 @@ TEST(Valves, NeverLeaveTheSupply) {
   EXPECT_EQ(valves.pressures_bar()[2], 0.0);
 }
 
-TEST(Valves, VentWithALagOfTheirOwn) {
+TEST(Valves, FillAndVentWithDifferentLags) {
   Valves valves({.lag_s = 0.6, .supply_pressure_bar = 2.0, .vent_lag_s = 1.5}, 1);
   EXPECT_FALSE(valves.exponential());
   valves.command(std::array{1.0});
