@@ -35,6 +35,7 @@ ControlPipeline::ControlPipeline(const PipelineSettings& settings)
                  body_noise(settings.estimation, settings.arm.size())),
       filter_(settings.estimation, settings.arm.size()),
       observer_(make_observer(settings)),
+      newest_frames_(observer_ ? NewestFrames::most(settings.arm.size(), period_s_) : 0),
       delay_ns_(observer_ ? to_ns(settings.control.dead_time_s) : 0),
       safety_(settings.safety, period_s_),
       activation_limit_(settings.safety),
@@ -137,6 +138,7 @@ void ControlPipeline::validate_and_estimate(const TickInput& input, SafetyInput&
   }
   const CommandedMotion commanded{command_moves_.began_ns(), settings_.safety.frozen_frames};
   const std::int64_t max_latency_ns = to_ns(settings_.safety.max_latency_s);
+  const bool too_many = newest_frames_.too_many(input.frames.size());
   for (const MocapFrame& frame : input.frames) {
     if (gap) break;
     // A capture yet to come would make all after it look old, and its age hide the silence of the
@@ -154,12 +156,13 @@ void ControlPipeline::validate_and_estimate(const TickInput& input, SafetyInput&
       ++safety.bad_frames;
       continue;
     }
-    use_frame();
+    use_frame(too_many);
     const auto& seen = validator_.estimate().valid;
     const bool complete = std::all_of(seen.begin(), seen.begin() + settings_.arm.size(),
                                       [](bool each) { return each; });
     ++(complete ? safety.good_frames : safety.bad_frames);
   }
+  if (too_many) newest_frames_.take([this](const auto&... kept) { observe(kept...); });
   safety.now_ns = input.now_ns;
   safety.frames_refused = output_.refusal != FrameVerdict::accepted;
   safety.frame_period_mismatch = frame_period_watch_.mismatch();
@@ -207,8 +210,9 @@ void ControlPipeline::watch(const TickInput& input, SafetyInput& safety) noexcep
   safety.curvature_mismatch = curvature_watch_.out_of_tolerance();
 }
 
-/// Of the newest accepted frame.
-void ControlPipeline::use_frame() noexcept {
+/// Of the newest accepted frame. The filter takes every frame, the observer, which costs more, those
+/// of a tick that are not `too_many`.
+void ControlPipeline::use_frame(bool too_many) noexcept {
   const MocapFrame& frame = validator_.newest();
   const CurvatureEstimate& estimate = validator_.estimate();
   for (int i = 0; i < settings_.arm.size(); ++i)
@@ -229,9 +233,19 @@ void ControlPipeline::use_frame() noexcept {
   // deviation.
   const bool expects = safety_.mode() == Mode::active;
   if (expects) expect(frame.capture_ns);
-  filter_.update(frame.capture_ns, estimate, expects ? &known_ : nullptr);
-  if (observer_)
-    observer_->update(frame, estimate, expects ? &known_ : nullptr, !output_.saturated);
+  const KnownMotion* const expected = expects ? &known_ : nullptr;
+  filter_.update(frame.capture_ns, estimate, expected);
+  if (!observer_) return;
+  if (too_many) {
+    newest_frames_.keep(frame, estimate, expected);
+  } else {
+    observe(frame, estimate, expected);
+  }
+}
+
+void ControlPipeline::observe(const MocapFrame& frame, const CurvatureEstimate& estimate,
+                              const KnownMotion* expected) noexcept {
+  observer_->update(frame, estimate, expected, !output_.saturated);
 }
 
 void ControlPipeline::predict(std::int64_t now_ns, std::int64_t at_ns) noexcept {

@@ -20,6 +20,7 @@
 #include "softarm/estimation/frame_validator.hpp"
 #include "softarm/runtime/activation_limit.hpp"
 #include "softarm/runtime/following.hpp"
+#include "softarm/runtime/newest_frames.hpp"
 #include "softarm/runtime/safety_monitor.hpp"
 #include "softarm/runtime/settings.hpp"
 
@@ -98,6 +99,8 @@ class ControlPipeline {
   const FrameCounters& counters() const noexcept { return validator_.counters(); }
   /// Dropped for their age: captured more than max_latency_s ago, or not yet.
   std::int64_t late_frames() const noexcept { return late_frames_; }
+  /// Accepted, but not taken by the model-based observer: too many in one tick (NewestFrames).
+  std::int64_t frames_left_out() const noexcept { return newest_frames_.left_out(); }
   /// u and residuals of the newest accepted frame.
   const CurvatureEstimate& estimate() const noexcept { return validator_.estimate(); }
   /// Every commanded pressure is zero.
@@ -109,7 +112,9 @@ class ControlPipeline {
   void forget_command() noexcept;
   void validate_and_estimate(const TickInput& input, SafetyInput& safety) noexcept;
   void watch(const TickInput& input, SafetyInput& safety) noexcept;
-  void use_frame() noexcept;
+  void use_frame(bool too_many) noexcept;
+  void observe(const MocapFrame& frame, const CurvatureEstimate& estimate,
+               const KnownMotion* expected) noexcept;
   void predict(std::int64_t now_ns, std::int64_t at_ns) noexcept;
   void expect(std::int64_t at_ns) noexcept;
   void take_reference(const TickInput& input) noexcept;
@@ -125,6 +130,7 @@ class ControlPipeline {
   FrameValidator validator_;
   CurvatureFilter filter_;
   std::unique_ptr<ModelObserver> observer_;  ///< where it is configured
+  NewestFrames newest_frames_;               ///< that it takes of too many in one tick
   std::int64_t delay_ns_;                    ///< that they and the controller look ahead by
   SafetyMonitor safety_;
   ActivationLimit activation_limit_;

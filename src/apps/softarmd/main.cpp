@@ -77,13 +77,19 @@ void run(DaemonLoop& loop, LineLog& log, ServiceNotifier& service, const LcmSett
   constexpr std::int64_t kRefused_ns = 1'000'000'000;  // malformed messages may come at any rate
   Mode mode = Mode::init;
   Reason reason = Reason::none;
-  std::int64_t refused = 0, refused_reported_ns = kNever;
+  std::int64_t refused = 0, left_out = 0, refused_reported_ns = kNever;
   const auto report_refused = [&](std::int64_t now_ns) {
     const std::int64_t total = loop.link().malformed();
-    if (total == refused || now_ns < refused_reported_ns + kRefused_ns) return;
-    log.add("{} malformed messages refused, {} in all", total - refused, total);
+    const std::int64_t total_left_out = loop.pipeline().frames_left_out();
+    if (now_ns < refused_reported_ns + kRefused_ns) return;
+    if (total != refused)
+      log.add("{} malformed messages refused, {} in all", total - refused, total);
+    if (total_left_out != left_out)
+      log.add("{} frames too many in one tick for the observer, {} in all",
+              total_left_out - left_out, total_left_out);
+    if (total != refused || total_left_out != left_out) refused_reported_ns = now_ns;
     refused = total;
-    refused_reported_ns = now_ns;
+    left_out = total_left_out;
   };
   InputReport report_inputs;
   const auto report_streams = [&](std::int64_t now_ns) {

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -401,6 +402,44 @@ TEST(CauseTableInCode, TheMoreSevereComeFirst) {
     if (rules[k].demands == rules[k - 1].demands) {
       EXPECT_LE(rules[k].clearance, rules[k - 1].clearance) << name(rules[k].reason);
     }
+  }
+}
+
+/// docs/reference/faults.md. Of causes that demand and clear the same, the first is reported.
+TEST(CauseTableInCode, IsAsDocumented) {
+  constexpr std::array kDocumented{
+      CauseRule{Reason::emergency_stop, Mode::fault, Clearance::disarm_then_arm},
+      CauseRule{Reason::shutdown, Mode::vent, Clearance::never},
+      CauseRule{Reason::valves_silent, Mode::fault, Clearance::disarm_then_arm},
+      CauseRule{Reason::pressure_mismatch, Mode::fault, Clearance::disarm_then_arm},
+      CauseRule{Reason::curvature_mismatch, Mode::fault, Clearance::disarm_then_arm},
+      CauseRule{Reason::length_mismatch, Mode::fault, Clearance::disarm_then_arm},
+      CauseRule{Reason::disarmed, Mode::vent, Clearance::arm},
+      CauseRule{Reason::deadman_released, Mode::vent, Clearance::arm},
+      CauseRule{Reason::requests_lost, Mode::vent, Clearance::arm},
+      CauseRule{Reason::foreign_commands, Mode::vent, Clearance::arm},
+      CauseRule{Reason::soft_limit, Mode::vent, Clearance::arm},
+      CauseRule{Reason::activated_too_often, Mode::vent, Clearance::arm},
+      CauseRule{Reason::oscillation, Mode::vent, Clearance::arm},
+      CauseRule{Reason::valves_silent, Mode::vent, Clearance::good_frames},
+      CauseRule{Reason::pressure_mismatch, Mode::vent, Clearance::good_frames},
+      CauseRule{Reason::length_mismatch, Mode::vent, Clearance::good_frames},
+      CauseRule{Reason::time_gap, Mode::vent, Clearance::good_frames},
+      CauseRule{Reason::command_expired, Mode::vent, Clearance::good_frames},
+      CauseRule{Reason::sender_restarted, Mode::vent, Clearance::good_frames},
+      CauseRule{Reason::frames_stale, Mode::vent, Clearance::good_frames},
+      CauseRule{Reason::frame_period_mismatch, Mode::vent, Clearance::good_frames},
+      CauseRule{Reason::many_overruns, Mode::vent, Clearance::good_frames},
+      CauseRule{Reason::frames_late, Mode::hold, Clearance::good_frames},
+      CauseRule{Reason::poses_frozen, Mode::hold, Clearance::good_frames},
+      CauseRule{Reason::overruns, Mode::hold, Clearance::good_frames}};
+  const auto rules = cause_table();
+  ASSERT_EQ(rules.size(), kDocumented.size());
+  for (std::size_t k = 0; k < rules.size(); ++k) {
+    SCOPED_TRACE(k);
+    EXPECT_EQ(rules[k].reason, kDocumented[k].reason) << name(rules[k].reason);
+    EXPECT_EQ(rules[k].demands, kDocumented[k].demands) << name(rules[k].reason);
+    EXPECT_EQ(rules[k].clearance, kDocumented[k].clearance) << name(rules[k].reason);
   }
 }
 
