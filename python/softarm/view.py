@@ -19,7 +19,7 @@ POINTS_PER_SEGMENT = 12
 PATH_POINTS = 400
 PLOT_S = 10.0
 FRAME_S = 1.0 / 30.0
-MEASURED, REFERENCE, TRUTH = (31, 119, 180), (44, 160, 44), (150, 150, 150)
+MEASURED, REFERENCE, TRUTH, TIP = (31, 119, 180), (44, 160, 44), (150, 150, 150), (235, 80, 10)
 EMPTY, FULL = np.array([70, 110, 200]), np.array([220, 60, 40])
 
 
@@ -115,10 +115,12 @@ class View:
         scene.add_grid("/floor", 2 * reach, 2 * reach, cell_size=reach / 10, position=(0, 0, straight[:, 2].min() - 0.1 * reach))
         scene.add_frame("/base", axes_length=0.1 * reach, axes_radius=0.004 * reach, position=straight[0])
         self._lines = {
-            name: scene.add_spline_catmull_rom(f"/{name}", straight, color=color, line_width=width, visible=name == "measured")
-            for name, color, width in (("measured", MEASURED, 10), ("reference", REFERENCE, 4), ("truth", TRUTH, 4))
+            name: scene.add_spline_catmull_rom(
+                f"/{name}", straight, color=color, thickness=width, thickness_units="screen", visible=name == "measured"
+            )
+            for name, color, width in (("measured", MEASURED, 8), ("reference", REFERENCE, 4), ("truth", TRUTH, 4))
         }
-        self._tip = scene.add_icosphere("/tip", radius=0.015 * reach, color=MEASURED, position=straight[-1])
+        self._tip = scene.add_icosphere("/tip", radius=0.03 * reach, color=TIP, position=straight[-1])
         self._path = scene.add_point_cloud("/path", np.zeros((1, 3)), (120, 120, 120), point_size=0.004 * reach)
         self._tips = []
         gui = self.server.gui
@@ -182,7 +184,9 @@ class View:
                         self._tip.position = line[-1]
                         self._tips = [*self._tips[1 - PATH_POINTS :], line[-1]]
                         self._path.points = np.array(self._tips, dtype=np.float32)
-            self.say(f"**{picture.mode}** ({picture.reason}), {picture.t_s:.1f} s")
+            reason = "" if picture.reason == "none" else f" ({picture.reason})"
+            tip = ", ".join(f"{1e3 * value:.1f}" for value in self._tip.position)
+            self.say(f"**{picture.mode}**{reason}, {picture.t_s:.1f} s, tip [{tip}] mm")
             self._pressures.content = self._bars(picture.pressure_bar)
         self._history.append((picture.t_s, picture.error_mrad(), np.max(picture.pressure_bar, initial=0.0)))
         if self._history[-1][0] < self._history[0][0]:

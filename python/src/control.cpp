@@ -152,7 +152,20 @@ void bind_allocator(py::module_& module) {
                                         force);
             return force;
           },
-          py::arg("pressure_bar"), "Generalized force in u that pressures give, (2n,), N m.");
+          py::arg("pressure_bar"), "Generalized force in u that pressures give, (2n,), N m.")
+      .def_property_readonly(
+          "input_matrix",
+          [](const PressureAllocator& allocator) {
+            const int chambers = allocator.chambers();
+            Eigen::MatrixXd matrix(2 * allocator.segments(), chambers);
+            VectorXd force(2 * allocator.segments());
+            for (int j = 0; j < chambers; ++j) {
+              allocator.generalized_force(VectorXd::Unit(chambers, j), force);
+              matrix.col(j) = force;
+            }
+            return matrix;
+          },
+          "d generalized_force / d pressure, (2n, chambers), N m/bar: it does not depend on u.");
 }
 
 }  // namespace

@@ -4,7 +4,7 @@
 #include <memory>
 #include <vector>
 
-#include "module.hpp"
+#include "arm.hpp"
 #include "softarm/model/actuation_matrix.hpp"
 #include "softarm/model/arm.hpp"
 #include "softarm/model/dynamics.hpp"
@@ -18,16 +18,6 @@ namespace {
 
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-
-/// An arm with the storage of its dynamics: Python calls with the interpreter's lock held.
-struct Arm {
-  explicit Arm(const ArmParameters& arm) : parameters(arm), workspace(arm) {}
-  const VectorXd& u(const VectorXd& value, const char* name = "u") const {
-    return expect(value, parameters.dof(), name);
-  }
-  ArmParameters parameters;
-  DynamicsWorkspace workspace;
-};
 
 MassModel mass_model(const std::string& name) {
   if (name == "point") return MassModel::point;
@@ -300,6 +290,7 @@ void bind_model(py::module_& module) {
       });
   bind_kinematics(type);
   bind_dynamics(type);
+  bind_derivatives(type);
 
   module.def(
       "polar_to_u",

@@ -20,8 +20,8 @@ T doubled(const std::array<T, 12>& c) noexcept {
 /// Below the limit. Each coefficient set is the only combination of c_k(4s) and c_k(s), k = 3 ...
 /// 11, whose power series in s is that of the integral: products of sines and cosines of x theta
 /// become those of 2 x theta, and the polynomials in x in front are what raises k.
-template <class T>
-ArcMomentsOf<T> from_entire(T scale, const std::array<T, 12>& c) noexcept {
+template <class S, class T>
+ArcMomentsOf<T> from_entire(const S& scale, const std::array<T, 12>& c) noexcept {
   const T d3 = doubled<3>(c), d4 = doubled<4>(c), d5 = doubled<5>(c), d6 = doubled<6>(c),
           d7 = doubled<7>(c), d8 = doubled<8>(c), d9 = doubled<9>(c), d10 = doubled<10>(c),
           d11 = doubled<11>(c);
@@ -46,15 +46,16 @@ ArcMomentsOf<T> from_entire(T scale, const std::array<T, 12>& c) noexcept {
 }
 
 /// Integrals of y^k cos(w y) and y^k sin(w y) over [0, theta], k = 0 ... 3, by parts.
+template <class T>
 struct TrigonometricMoments {
-  double cosine[4], sine[4];
+  T cosine[4], sine[4];
 
-  TrigonometricMoments(double w, double theta, double sin_end, double cos_end,
-                       double one_minus_cos_end) noexcept {
+  TrigonometricMoments(double w, const T& theta, const T& sin_end, const T& cos_end,
+                       const T& one_minus_cos_end) noexcept {
     const double inverse = 1.0 / w;
     cosine[0] = sin_end * inverse;
     sine[0] = one_minus_cos_end * inverse;
-    double power = theta;
+    T power = theta;
     for (int k = 1; k < 4; ++k) {
       sine[k] = (k * cosine[k - 1] - power * cos_end) * inverse;
       cosine[k] = (power * sin_end - k * sine[k - 1]) * inverse;
@@ -66,16 +67,18 @@ struct TrigonometricMoments {
 /// Above the limit, with y = x theta, S = sin y, C = cos y, V = 1 - C:
 /// P = V / theta^2, P1 = (y S - 2 V) / theta^4, P2 = (y^2 C - 5 y S + 8 V) / theta^6,
 /// Q = S / theta,   Q1 = (y C - S) / theta^3,   Q2 = (3 S - 3 y C - y^2 S) / theta^5.
-ArcMoments from_trigonometry(double scale, double s, double c0, double c1) noexcept {
-  const double theta = std::sqrt(s);
-  const double sine = c1 * theta;
-  const TrigonometricMoments once(1.0, theta, sine, c0, 1.0 - c0);
-  const TrigonometricMoments twice(2.0, theta, 2.0 * sine * c0, 1.0 - 2.0 * sine * sine,
-                                   2.0 * sine * sine);
-  double SS[4], SC[4], CC[4], VS[4], VC[4];  // integrals of y^k times the product
-  double power = theta;
+template <class S, class T>
+ArcMomentsOf<T> from_trigonometry(const S& scale, const T& s, const T& c0, const T& c1) noexcept {
+  using std::sqrt;
+  const T theta = sqrt(s);
+  const T sine = c1 * theta;
+  const TrigonometricMoments<T> once(1.0, theta, sine, c0, 1.0 - c0);
+  const TrigonometricMoments<T> twice(2.0, theta, 2.0 * sine * c0, 1.0 - 2.0 * sine * sine,
+                                      2.0 * sine * sine);
+  T SS[4], SC[4], CC[4], VS[4], VC[4];  // integrals of y^k times the product
+  T power = theta;
   for (int k = 0; k < 4; ++k) {
-    const double one = power / (k + 1);
+    const T one = power / (k + 1);
     SS[k] = 0.5 * (one - twice.cosine[k]);
     CC[k] = 0.5 * (one + twice.cosine[k]);
     SC[k] = 0.5 * twice.sine[k];
@@ -83,10 +86,10 @@ ArcMoments from_trigonometry(double scale, double s, double c0, double c1) noexc
     VC[k] = once.cosine[k] - CC[k];
     power *= theta;
   }
-  const double VV = theta - 2.0 * once.cosine[0] + CC[0];
-  const double i1 = 1.0 / theta, i2 = i1 * i1;
-  const double w3 = scale * i1 * i2, w4 = w3 * i1, w5 = w3 * i2, w6 = w5 * i1, w7 = w5 * i2;
-  ArcMoments m;
+  const T VV = theta - 2.0 * once.cosine[0] + CC[0];
+  const T i1 = 1.0 / theta, i2 = i1 * i1;
+  const T w3 = scale * i1 * i2, w4 = w3 * i1, w5 = w3 * i2, w6 = w5 * i1, w7 = w5 * i2;
+  ArcMomentsOf<T> m;
   m.pp = w5 * VV;
   m.pq = w4 * VS[0];
   m.qq = w3 * SS[0];
@@ -131,5 +134,30 @@ ArcMomentsOf<Lanes> arc_moments(const Lanes& mass_length_squared, const Lanes& s
   }
   return all;
 }
+
+template <class S, class D>
+ArcMomentsOf<Dual<Lanes, D>> arc_moments(const S& mass_length_squared, const Dual<Lanes, D>& s,
+                                         const std::array<Dual<Lanes, D>, 12>& c) noexcept {
+  ArcMomentsOf<Dual<Lanes, D>> all = from_entire(mass_length_squared, c);
+  for (int lane = 0; lane < kLanes; ++lane) {
+    if (s.v[lane] < kArcSeriesLimit) continue;
+    auto one = from_trigonometry(at(mass_length_squared, lane), at(s, lane), at(c[0], lane),
+                                 at(c[1], lane));
+    const auto to = members(all);
+    const auto from = members(one);
+    for (std::size_t k = 0; k < to.size(); ++k) {
+      to[k]->v[lane] = from[k]->v;
+      for (std::size_t e = 0; e < to[k]->d.along.size(); ++e) {
+        to[k]->d.along[e][lane] = from[k]->d[static_cast<int>(e)];
+      }
+    }
+  }
+  return all;
+}
+
+template ArcMomentsOf<BendingLanes> arc_moments(const Lanes&, const BendingLanes&,
+                                                const std::array<BendingLanes, 12>&) noexcept;
+template ArcMomentsOf<StretchLanes> arc_moments(const StretchLanes&, const StretchLanes&,
+                                                const std::array<StretchLanes, 12>&) noexcept;
 
 }  // namespace softarm

@@ -7,6 +7,7 @@
 
 #include <array>
 
+#include "model/dual.hpp"
 #include "model/segment_geometry.hpp"
 
 namespace softarm {
@@ -36,5 +37,10 @@ ArcMoments arc_moments(double mass_length_squared, double s,
 /// The same of four segments. A lane's numbers do not depend on its neighbours.
 ArcMomentsOf<Lanes> arc_moments(const Lanes& mass_length_squared, const Lanes& s,
                                 const std::array<Lanes, 12>& c) noexcept;
+
+/// With tangents: defined for Lanes with two or three of them, and S Lanes of either kind.
+template <class S, class D>
+ArcMomentsOf<Dual<Lanes, D>> arc_moments(const S& mass_length_squared, const Dual<Lanes, D>& s,
+                                         const std::array<Dual<Lanes, D>, 12>& c) noexcept;
 
 }  // namespace softarm

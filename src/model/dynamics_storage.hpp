@@ -11,14 +11,16 @@
 namespace softarm {
 
 /// Inverse dynamics: what a segment's own mass does, in S_{i-1}.
-struct SegmentForces {
-  Vector3 force;
-  Vector3 moment;             ///< about the segment's base p_{i-1}
-  double torque_x, torque_y;  ///< on the segment's own u
+template <class S>
+struct SegmentForcesOf {
+  Vec3<S> force;
+  Vec3<S> moment;        ///< about the segment's base p_{i-1}
+  S torque_x, torque_y;  ///< on the segment's own u
 };
 /// Where segments stretch.
-struct ExtensibleForces : SegmentForces {
-  double virial;  ///< sum of r . F, of which 1/l is the force on e
+template <class S>
+struct ExtensibleForcesOf : SegmentForcesOf<S> {
+  S virial;  ///< sum of r . F, of which 1/l is the force on e
 };
 
 /// Full matrices: a segment's columns, all in S_{i-1}. A dot is a time derivative in the world,
@@ -37,15 +39,13 @@ struct SegmentColumns {
   OwnColumns<kExtensible> own;
 };
 
-template <bool kExtensible>
-using LanesOf = std::conditional_t<kExtensible, ExtensibleLanes, SegmentLanes>;
-template <bool kExtensible>
-using ForcesOf = std::conditional_t<kExtensible, ExtensibleForces, SegmentForces>;
+template <bool kExtensible, class S>
+using ForcesOf = std::conditional_t<kExtensible, ExtensibleForcesOf<S>, SegmentForcesOf<S>>;
 
 template <bool kExtensible>
 struct SegmentStorage {
-  std::vector<LanesOf<kExtensible>> lanes;  // four segments each
-  std::vector<ForcesOf<kExtensible>> forces;
+  std::vector<LanesOf<kExtensible, Lanes>> lanes;  // four segments each
+  std::vector<ForcesOf<kExtensible, double>> forces;
   std::vector<SegmentColumns<kExtensible>> columns;
 
   explicit SegmentStorage(std::size_t segments)

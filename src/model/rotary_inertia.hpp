@@ -9,21 +9,25 @@
 #pragma once
 
 #include <array>
+#include <type_traits>
 
+#include "model/dual.hpp"
 #include "model/segment_geometry.hpp"
 
 namespace softarm {
 
 /// Motion of S_{i-1} in its own axes, and the directions of the bilinear form in it.
+template <class S, class T>
 struct DiscMotion {
-  Vector3 spin_a, spin_b, angular;
-  double ux, uy;
-  Direction a, b, x;
+  Vec3<S> spin_a, spin_b, angular;
+  T ux, uy;
+  DirectionOf<T> a, b, x;
 };
 
+template <class S>
 struct DiscForces {
-  Vector3 moment;  ///< in S_{i-1}
-  double torque_x, torque_y;
+  Vec3<S> moment;  ///< in S_{i-1}
+  S torque_x, torque_y;
 };
 
 namespace detail {
@@ -49,37 +53,65 @@ inline constexpr std::array<Lanes, 4> kArcWeights = {
           0.01357622970587704743}};
 
 inline double sum(const Lanes& v) noexcept { return (v[0] + v[1]) + (v[2] + v[3]); }
+inline BendingDual sum(const BendingLanes& a) noexcept {
+  return {sum(a.v), Pair{sum(a.d.along[0]), sum(a.d.along[1])}};
+}
+inline StretchDual sum(const StretchLanes& a) noexcept {
+  return {sum(a.v), Lanes{sum(a.d.along[0]), sum(a.d.along[1]), sum(a.d.along[2]), 0.0}};
+}
+
+/// One number for all nodes.
+inline double spread(double a) noexcept { return a; }
+inline BendingLanes spread(const BendingDual& a) noexcept {
+  return {Lanes{} + a.v, LaneTangents<2>{{Lanes{} + a.d[0], Lanes{} + a.d[1]}}};
+}
+inline StretchLanes spread(const StretchDual& a) noexcept {
+  return {Lanes{} + a.v, LaneTangents<3>{{Lanes{} + a.d[0], Lanes{} + a.d[1], Lanes{} + a.d[2]}}};
+}
+template <class S>
+auto spread(const Vec3<S>& v) noexcept {
+  return Vec3<decltype(spread(v.x))>{spread(v.x), spread(v.y), spread(v.z)};
+}
 
 }  // namespace detail
 
 /// @param inertia mu r^2 / 4 of the whole segment, kg m^2.
-inline DiscForces disc_forces(double inertia, const DiscMotion& m) noexcept {
-  Vec3<Lanes> moment{};
-  Lanes torque_x{}, torque_y{};
+template <class S, class T>
+auto disc_forces(double inertia, const DiscMotion<S, T>& m) noexcept {
+  using detail::spread, detail::sum;
+  using R = decltype(spread(m.angular.x) * (Lanes{} * spread(m.ux)));
+  const auto spin_a = spread(m.spin_a), spin_b = spread(m.spin_b);
+  const auto frame_angular = spread(m.angular);
+  const auto spread_direction = [](const Lanes& x, const DirectionOf<T>& d, const auto& ux,
+                                   const auto& uy) {
+    return direction(ux, uy, x * spread(d.x), x * spread(d.y));
+  };
+  Vec3<R> moment{};
+  R torque_x{}, torque_y{};
   for (std::size_t node = 0; node < detail::kArcNodes.size(); ++node) {
     const Lanes x = detail::kArcNodes[node], weight = inertia * detail::kArcWeights[node];
-    const Lanes ux = x * m.ux, uy = x * m.uy;
+    const auto ux = x * spread(m.ux), uy = x * spread(m.uy);
     const auto c = entire<8>(ux * ux + uy * uy);
-    const SpinOf<Lanes> turn_rate = spin(c);
-    const auto along_a = direction(ux, uy, x * m.a.x, x * m.a.y);
-    const auto along_b = direction(ux, uy, x * m.b.x, x * m.b.y);
-    const auto along_x = direction(ux, uy, x * m.x.x, x * m.x.y);
-    const Vec3<Lanes> own_a = first(turn_rate, ux, uy, along_a);
-    const Vec3<Lanes> own_b = first(turn_rate, ux, uy, along_b);
-    const Vec3<Lanes> a = m.spin_a + own_a, b = m.spin_b + own_b;
-    const Vec3<Lanes> angular = m.angular + second(turn_rate, ux, uy, along_a, along_b) +
-                                first(turn_rate, ux, uy, along_x) +
-                                0.5 * (cross(m.spin_a, own_b) + cross(m.spin_b, own_a));
-    const Vec3<Lanes> tangent{c[1] * ux, c[1] * uy, c[0]};
-    const Vec3<Lanes> gyroscopic = cross(dot(tangent, b) * a + dot(tangent, a) * b, tangent);
-    const Vec3<Lanes> H = weight * (angular + dot(tangent, angular) * tangent + 0.5 * gyroscopic);
+    const auto turn_rate = spin(c);
+    const auto along_a = spread_direction(x, m.a, ux, uy);
+    const auto along_b = spread_direction(x, m.b, ux, uy);
+    const auto along_x = spread_direction(x, m.x, ux, uy);
+    const auto own_a = first(turn_rate, ux, uy, along_a);
+    const auto own_b = first(turn_rate, ux, uy, along_b);
+    const auto a = spin_a + own_a, b = spin_b + own_b;
+    const auto angular = frame_angular + second(turn_rate, ux, uy, along_a, along_b) +
+                         first(turn_rate, ux, uy, along_x) +
+                         0.5 * (cross(spin_a, own_b) + cross(spin_b, own_a));
+    const Vec3<std::remove_cv_t<decltype(ux)>> tangent{c[1] * ux, c[1] * uy, c[0]};
+    const auto gyroscopic = cross(dot(tangent, b) * a + dot(tangent, a) * b, tangent);
+    const auto H = weight * (angular + dot(tangent, angular) * tangent + 0.5 * gyroscopic);
     moment += H;
-    const Lanes stretch = turn_rate.c3 * (ux * H.y - uy * H.x);
+    const auto stretch = turn_rate.c3 * (ux * H.y - uy * H.x);
     torque_x += x * (turn_rate.c1 * H.y + stretch * ux - turn_rate.c2 * uy * H.z);
     torque_y += x * (-turn_rate.c1 * H.x + stretch * uy + turn_rate.c2 * ux * H.z);
   }
-  using detail::sum;
-  return {{sum(moment.x), sum(moment.y), sum(moment.z)}, sum(torque_x), sum(torque_y)};
+  return DiscForces<decltype(sum(torque_x))>{
+      {sum(moment.x), sum(moment.y), sum(moment.z)}, sum(torque_x), sum(torque_y)};
 }
 
 }  // namespace softarm

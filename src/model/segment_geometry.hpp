@@ -16,8 +16,9 @@ struct CurveOf {
 };
 using Curve = CurveOf<double>;
 
-template <class T, class Functions>
-inline CurveOf<T> tip_curve(T length, const Functions& c) noexcept {
+template <class Length, class Functions>
+inline CurveOf<typename Functions::value_type> tip_curve(const Length& length,
+                                                         const Functions& c) noexcept {
   return {length * c[2],
           length * c[1],
           length * (2.0 * c[4] - c[3]),
@@ -26,8 +27,9 @@ inline CurveOf<T> tip_curve(T length, const Functions& c) noexcept {
           length * (3.0 * (c[5] - c[4]) + c[3])};
 }
 
-template <class T, class Functions>
-inline CurveOf<T> centre_curve(T length, const Functions& c) noexcept {
+template <class Length, class Functions>
+inline CurveOf<typename Functions::value_type> centre_curve(const Length& length,
+                                                            const Functions& c) noexcept {
   return {length * c[3],
           length * c[2],
           length * (3.0 * c[5] - c[4]),
@@ -88,20 +90,24 @@ inline PairVector3 column_rates(const Curve& f, double ux, double uy, const Dire
 }
 
 /// R = I + c1 [w]x + c2 [w]x^2 of S_i in S_{i-1}, w = (-u_y, u_x, 0), applied in ten operations.
-struct Turn {
-  double ux, uy, c0, c1, c2;
+template <class S>
+struct TurnOf {
+  S ux, uy, c0, c1, c2;
 };
-template <class T>
-inline Vec3<T> rotate(const Turn& r, const Vec3<T>& v) noexcept {
-  const T along = r.ux * v.x + r.uy * v.y;
-  const T shift = r.c1 * v.z - r.c2 * along;
-  return {v.x + r.ux * shift, v.y + r.uy * shift, r.c0 * v.z - r.c1 * along};
+using Turn = TurnOf<double>;
+template <class S, class T>
+inline auto rotate(const TurnOf<S>& r, const Vec3<T>& v) noexcept {
+  const auto along = r.ux * v.x + r.uy * v.y;
+  const auto shift = r.c1 * v.z - r.c2 * along;
+  return Vec3<decltype(r.ux * v.x)>{v.x + r.ux * shift, v.y + r.uy * shift,
+                                    r.c0 * v.z - r.c1 * along};
 }
-template <class T>
-inline Vec3<T> rotate_back(const Turn& r, const Vec3<T>& v) noexcept {
-  const T along = r.ux * v.x + r.uy * v.y;
-  const T shift = r.c1 * v.z + r.c2 * along;
-  return {v.x - r.ux * shift, v.y - r.uy * shift, r.c0 * v.z + r.c1 * along};
+template <class S, class T>
+inline auto rotate_back(const TurnOf<S>& r, const Vec3<T>& v) noexcept {
+  const auto along = r.ux * v.x + r.uy * v.y;
+  const auto shift = r.c1 * v.z + r.c2 * along;
+  return Vec3<decltype(r.ux * v.x)>{v.x - r.ux * shift, v.y - r.uy * shift,
+                                    r.c0 * v.z + r.c1 * along};
 }
 
 /// Coefficients of the angular velocity of S_i relative to S_{i-1}, written in S_{i-1}:

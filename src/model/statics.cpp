@@ -4,6 +4,7 @@
 
 #include "model/dynamics_storage.hpp"
 #include "softarm/model/actuation_matrix.hpp"
+#include "softarm/model/derivatives.hpp"
 
 namespace softarm {
 
@@ -21,19 +22,12 @@ void static_moments(const ArmParameters& arm, DynamicsWorkspace& workspace, Cons
 }
 
 Eigen::MatrixXd gravity_slope(const ArmParameters& arm, const Eigen::VectorXd& at) {
-  constexpr double kStep_rad = 1e-4;
-  const Eigen::Index dof = at.size();
-  DynamicsWorkspace workspace(arm);
-  Eigen::MatrixXd slope(dof, dof);
-  Eigen::VectorXd u = at, above(dof), below(dof);
-  for (Eigen::Index j = 0; j < dof; ++j) {
-    u[j] = at[j] + kStep_rad;
-    gravity_moments(arm, workspace, u, above);
-    u[j] = at[j] - kStep_rad;
-    gravity_moments(arm, workspace, u, below);
-    u[j] = at[j];
-    slope.col(j) = (above - below) / (2.0 * kStep_rad);
+  ArmParameters limp = arm;
+  for (SegmentParameters& segment : limp.segments) {
+    segment.stiffness_nm_per_rad = segment.axial_stiffness_n_per_m = 0.0;
   }
+  Eigen::MatrixXd slope(at.size(), at.size());
+  ModelDerivatives(limp).static_stiffness(at, slope);
   return slope;
 }
 

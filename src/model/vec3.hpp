@@ -56,7 +56,6 @@ inline Vector3 column(const Vec3<T>& v, int k) noexcept {
 inline PairVector3 side_by_side(const Vector3& a, const Vector3& b) noexcept {
   return {Pair{a.x, b.x}, Pair{a.y, b.y}, Pair{a.z, b.z}};
 }
-inline Vector3 lane(const Vec3<Lanes>& v, int k) noexcept { return column(v, k); }
 
 inline Vector3 from_eigen(const Eigen::Vector3d& v) noexcept { return {v.x(), v.y(), v.z()}; }
 inline Eigen::Vector3d to_eigen(const Vector3& v) noexcept { return {v.x, v.y, v.z}; }

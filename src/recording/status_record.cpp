@@ -41,6 +41,7 @@ void TruthTrack::fill(std::int64_t time_us, LogRow& row) const {
 StatusRecord::StatusRecord(const Experiment& experiment, const std::filesystem::path& folder,
                            const Files& inputs)
     : experiment_(experiment), summary_(experiment.arm.size(), experiment.run.tracking_from_s) {
+  summary_.set_arm(experiment.arm);
   if (experiment.actuation.kind == ActuationKind::torque) summary_.commands_are_torques();
   if (folder.empty()) return;
   log_.emplace(folder, experiment, inputs);

@@ -139,6 +139,17 @@ struct TrackingSummary::Json {
     return json;
   }
 
+  static Value arm(const ArmParameters& arm) {
+    const auto numbers = [](const Eigen::Vector3d& v) { return Value{v.x(), v.y(), v.z()}; };
+    Value rows = Value::array(), lengths = Value::array();
+    for (Eigen::Index i = 0; i < 3; ++i)
+      rows.push_back(numbers(arm.base_rotation.row(i).transpose()));
+    for (const SegmentParameters& segment : arm.segments) lengths.push_back(segment.length_m);
+    return {{"length_m", lengths},
+            {"base_rotation", rows},
+            {"base_position_m", numbers(arm.base_position_m)}};
+  }
+
   static Value transitions(const TrackingSummary& of) {
     Value list = Value::array();
     for (const Transition& each : of.transitions_)
@@ -164,6 +175,7 @@ std::string TrackingSummary::json() const {
                       {"repeated", frames_->repeated},
                       {"missing", frames_->missing},
                       {"late", late_frames_}};
+  if (arm_) json["arm"] = Json::arm(*arm_);
   return json.dump() + "\n";
 }
 

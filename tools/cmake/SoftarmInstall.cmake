@@ -20,7 +20,11 @@ install(FILES README.md CONTRIBUTING.md CHANGELOG.md DESTINATION ${CMAKE_INSTALL
 install(DIRECTORY docs DESTINATION ${CMAKE_INSTALL_DOCDIR} FILES_MATCHING PATTERN "*.md" PATTERN "*.png" PATTERN "*.svg")
 install(DIRECTORY examples DESTINATION ${CMAKE_INSTALL_DOCDIR} FILES_MATCHING PATTERN "*.py" PATTERN "*.cpp" PATTERN "__pycache__" EXCLUDE)
 install(DIRECTORY tools/plotting DESTINATION ${CMAKE_INSTALL_DATADIR}/softarm
-  FILES_MATCHING PATTERN "*.py" PATTERN "__pycache__" EXCLUDE)
+  FILES_MATCHING PATTERN "*.py" PATTERN "*.js" PATTERN "__pycache__" EXCLUDE)
+# bash looks a completion up by the program's name.
+foreach(program softarm softarmd softarm-plant softarm-valves softarm-dev)
+  install(FILES tools/completion/softarm.bash DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions RENAME ${program})
+endforeach()
 # systemd units: softarmd@NAME, softarm-valves@NAME (docs/how-to/run_as_a_service.md).
 install(FILES docs/how-to/run_as_a_service.md DESTINATION ${CMAKE_INSTALL_DOCDIR}/docs/how-to COMPONENT units)
 install(CODE "set(SOFTARM_UNITS \"${PROJECT_SOURCE_DIR}/config/systemd\")

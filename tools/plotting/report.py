@@ -4,7 +4,7 @@ import html
 
 import numpy as np
 
-from . import style
+from . import player, style
 
 PAGE = """<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
@@ -22,10 +22,13 @@ th:first-child, td:first-child {{ text-align: left; }} th {{ background: #eaeff4
 tr:last-child td {{ border-bottom: 0; }}
 figure {{ margin: 0 0 1.2rem; background: white; border-radius: 6px; padding: .6rem; box-shadow: 0 1px 2px #0002; }}
 img {{ width: 100%; height: auto; display: block; }}
+.why {{ background: #fdf0d5; border-left: 4px solid #e07b39; padding: .5rem .8rem; }}
+#player canvas {{ width: 100%; display: block; touch-action: none; }}
+.controls {{ display: flex; gap: .6rem; }} .controls input {{ flex: 1; }}
 figcaption {{ color: #5b6770; font-size: .85rem; padding: .3rem .4rem 0; }}
 </style></head><body><main>
 <h1>{title}</h1><p class="origin">{origin}</p>
-<div class="tables">{tables}</div>
+{why}{player}<div class="tables">{tables}</div>
 <h2>Figures</h2>
 {figures}
 </main></body></html>
@@ -92,6 +95,8 @@ def timing_table(log):
 def _flat(prefix, value):
     if isinstance(value, dict):
         for key, inner in value.items():
+            if not prefix and key == "arm":
+                continue  # the configuration's, for the player
             yield from _flat(f"{prefix}{key}.", inner)
     elif isinstance(value, list):
         yield prefix.rstrip("."), ", ".join("–" if v is None else f"{v:.4g}" if isinstance(v, float) else str(v) for v in value)
@@ -112,6 +117,29 @@ def mode_table(log, longest=12):
     if len(spans) > longest:
         rows.append([f"and {len(spans) - longest} more", "", "", ""])
     return ["mode", "reason", "from [s]", "for [s]"], rows
+
+
+def why_not_active(log, longest=5):
+    """Sentences on the time that the arm was not ACTIVE after it might have been; nothing where there was none."""
+    spans = [span for span in log.mode_spans() if span[0]]
+    if not spans:
+        return []
+    def period(mode, reason, start, end):
+        because = "" if reason in ("", "none") else f": {reason.replace('_', ' ')}"
+        return f"{mode}{because}, from {start:.2f} s for {end - start:.2f} s"
+    active = [mode == "ACTIVE" for mode, *_ in spans]
+    if not any(active):
+        sentences = ["The arm never became ACTIVE."]
+        missed = spans
+    else:
+        missed = [span for span, was in zip(spans, active) if not was][1 if not active[0] else 0:]
+        if not missed:
+            return []
+        sentences = [f"The arm was not ACTIVE for {sum(end - start for _, _, start, end in missed):.2f} s after its start."]
+    sentences += [period(*span) for span in missed[:longest]]
+    if len(missed) > longest:
+        sentences.append(f"and {len(missed) - longest} more periods (table of modes)")
+    return sentences
 
 
 def tables(log, from_s):
@@ -148,7 +176,9 @@ def write(log, figures, from_s, title):
         pictures.append(f'<figure><img alt="{html.escape(caption)}" src="data:image/png;base64,{data}">'
                         f"<figcaption>{html.escape(caption)}</figcaption></figure>")
     path = log.directory / "report.html"
-    page = PAGE.format(title=html.escape(title), origin=html.escape(log.origin),
+    reasons = "<br>".join(map(html.escape, why_not_active(log)))
+    why = f'<p class="why">{reasons}</p>\n' if reasons else ""
+    page = PAGE.format(title=html.escape(title), origin=html.escape(log.origin), why=why, player=player.section(log),
                        tables="".join(map(_as_html, tables(log, from_s))), figures="\n".join(pictures))
     style.replace(path, lambda partial: partial.write_text(page, encoding="utf-8"))
     return path

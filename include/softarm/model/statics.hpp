@@ -20,8 +20,8 @@ void gravity_moments(const ArmParameters& arm, DynamicsWorkspace& workspace, Con
 void static_moments(const ArmParameters& arm, DynamicsWorkspace& workspace, ConstVectorRef u,
                     VectorRef out) noexcept;
 
-/// Slope of G at u (2n x 2n, N m/rad, symmetric but for rounding), by central differences. Not for
-/// the loop: allocates.
+/// Slope of G at u (2n x 2n, N m/rad, symmetric but for rounding), exact: `static_stiffness` of
+/// derivatives.hpp without springs. Not for the loop: allocates.
 Eigen::MatrixXd gravity_slope(const ArmParameters& arm, const Eigen::VectorXd& u);
 
 /// What is left of a static balance at u, 2n, N m.

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "softarm/estimation/frame_validator.hpp"
+#include "softarm/model/arm.hpp"
 #include "softarm/runtime/log_row.hpp"
 
 namespace softarm {
@@ -24,6 +25,9 @@ class TrackingSummary {
 
   /// Declares that commands are moments (N m), not pressures (bar).
   void commands_are_torques() { torques_ = true; }
+
+  /// Adds what a plot needs to place the arm in the world: lengths and base.
+  void set_arm(const ArmParameters& arm) { arm_ = arm; }
 
   /// Adds one tick. @param period_s  of the tick
   void add(const LogRow& row, double period_s);
@@ -115,6 +119,7 @@ class TrackingSummary {
   std::vector<Transition> transitions_;
   std::optional<FrameCounters> frames_;
   std::int64_t late_frames_ = 0;
+  std::optional<ArmParameters> arm_;
 };
 
 }  // namespace softarm

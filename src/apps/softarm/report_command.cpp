@@ -1,5 +1,5 @@
 // softarm report: evaluates a recorded LCM log (lcm-logger) of a run, with the same files and plots
-// as `softarm run`.
+// as `softarm run`; or puts the summaries of a folder of runs into one table.
 #include <fmt/format.h>
 
 #include <filesystem>
@@ -10,6 +10,7 @@
 #include "apps/softarm/commands.hpp"
 #include "apps/softarm/plots.hpp"
 #include "softarm/config/load.hpp"
+#include "softarm/recording/runs_table.hpp"
 #include "softarm/recording/status_record.hpp"
 #include "softarm/transport/event_log.hpp"
 
@@ -68,14 +69,20 @@ int report(const ReportOptions& options) {
 
 void add_report_command(CLI::App& app) {
   auto options = std::make_shared<ReportOptions>();
-  CLI::App* command = app.add_subcommand("report", "Tables and plots of a recorded LCM log");
-  command->add_option("LOG", options->log, "log of lcm-logger")->required();
-  command->add_option("CONFIG", options->config, "the experiment it was recorded of")->required();
+  CLI::App* command = app.add_subcommand(
+      "report", "Tables and plots of a recorded LCM log, or one table of a folder of runs");
+  command->add_option("LOG", options->log, "log of lcm-logger, or a folder of runs")->required();
+  command->add_option("CONFIG", options->config, "the experiment that the log was recorded of");
   command
       ->add_option("--out", options->out, "folder for log.csv, summary.json, timing.json and plots")
       ->capture_default_str();
   command->add_flag("!--no-plots", options->plots, "do not draw the plots");
   command->callback([options] {
+    if (std::filesystem::is_directory(options->log)) {
+      fmt::print("{}", runs_table(options->log));
+      return;
+    }
+    if (options->config.empty()) throw CLI::RequiredError("CONFIG");
     if (const int code = report(*options); code != kExitOk) throw CLI::RuntimeError(code);
   });
 }

@@ -78,6 +78,7 @@ int run(const RunOptions& options) {
   catch_stop_signals();  // what was recorded until then is kept
 
   TrackingSummary summary(experiment.arm.size(), experiment.run.tracking_from_s);
+  summary.set_arm(experiment.arm);
   if (experiment.actuation.kind == ActuationKind::torque) summary.commands_are_torques();
   TimingReport timing;
   std::string failure;

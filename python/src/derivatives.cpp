@@ -1,0 +1,71 @@
+// Exact derivatives of softarm.Arm's dynamics and statics.
+#include "softarm/model/derivatives.hpp"
+
+#include <stdexcept>
+
+#include "arm.hpp"
+
+namespace softarm::python {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+MatrixXd square(const Arm& arm) { return {arm.parameters.dof(), arm.parameters.dof()}; }
+
+py::tuple forward_dynamics_derivatives(Arm& arm, const VectorXd& u, const VectorXd& velocity,
+                                       const VectorXd& force) {
+  VectorXd acceleration(arm.parameters.dof());
+  MatrixXd by_u = square(arm), by_velocity = square(arm), by_force = square(arm);
+  if (!arm.derivatives().forward_dynamics(arm.u(u), arm.u(velocity, "velocity"),
+                                          arm.u(force, "generalized_force_nm"), acceleration, by_u,
+                                          by_velocity, by_force)) {
+    throw std::domain_error("the inertia matrix is not positive definite in double precision");
+  }
+  return py::make_tuple(acceleration, by_u, by_velocity, by_force);
+}
+
+}  // namespace
+
+void bind_derivatives(py::class_<Arm>& type) {
+  type.def(
+          "forward_dynamics_derivatives", &forward_dynamics_derivatives, py::arg("u"),
+          py::arg("velocity"), py::arg("generalized_force_nm"),
+          "(u'', d u''/du, d u''/du', d u''/d force), force held: (2n,) and three of (2n, 2n).\n\n"
+          "Exact. By pressures: by_force @ allocator.input_matrix; a force that depends on u adds\n"
+          "by_force @ (its slope) to the second.")
+      .def(
+          "inverse_dynamics_by_u",
+          [](Arm& arm, const VectorXd& u, const VectorXd& velocity, const VectorXd& acceleration) {
+            MatrixXd by_u = square(arm);
+            arm.derivatives().inverse_dynamics_by_u(arm.u(u), arm.u(velocity, "velocity"),
+                                                    arm.u(acceleration, "acceleration"), by_u);
+            return by_u;
+          },
+          py::arg("u"), py::arg("velocity"), py::arg("acceleration"),
+          "d inverse_dynamics / du with u' and u'' held, (2n, 2n), N m/rad; exact. By u': 2 C + "
+          "D,\n"
+          "by u'': B.")
+      .def(
+          "static_stiffness",
+          [](Arm& arm, const VectorXd& u) {
+            MatrixXd by_u = square(arm);
+            arm.derivatives().static_stiffness(arm.u(u), by_u);
+            return by_u;
+          },
+          py::arg("u"),
+          "K + dG/du, (2n, 2n), N m/rad: the slope of static_moments, exact. The shape at rest "
+          "moves\n"
+          "by solve(static_stiffness(u), allocator.input_matrix) for 1 bar in each chamber.")
+      .def(
+          "actuation_slope",
+          [](const Arm& arm, const VectorXd& u, const VectorXd& tau) {
+            MatrixXd by_u = square(arm);
+            actuation_slope(arm.parameters, arm.u(u), arm.u(tau, "tau_actuation_nm"), by_u);
+            return by_u;
+          },
+          py::arg("u"), py::arg("tau_actuation_nm"),
+          "d (A(u) tau_A) / du with tau_A held, (2n, 2n), N m/rad; zero for 'chamber'.");
+}
+
+}  // namespace softarm::python

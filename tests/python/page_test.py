@@ -1,0 +1,150 @@
+"""The pages a browser shows, in a headless Chromium: report.html without any server, `softarm view` of a recorded and of a live arm.
+
+usage: page_test.py BIN_DIR
+"""
+
+import io
+import pathlib
+import re
+import subprocess
+import sys
+import tempfile
+import unittest
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path[:0] = [str(ROOT / "tests/scripts"), str(ROOT / "build/release/python")]
+from running_arm import go_on_in_our_python, own_url, skip_without_multicast, start, wait_for, write_config  # noqa: E402
+
+go_on_in_our_python()
+import browser  # noqa: E402
+import numpy as np  # noqa: E402
+import PIL.Image  # noqa: E402
+import softarm  # noqa: E402
+import softarm.view  # noqa: E402
+
+if browser.program() is None:
+    print("skipped: there is no Chromium here (tools/install_packages --browser)")
+    sys.exit(77)
+BIN = pathlib.Path(sys.argv.pop())
+SOFTARM = BIN / "softarm"
+CONFIG = ROOT / "config/paper_arm.yaml"
+
+
+def recorded(folder, *more):
+    subprocess.run(
+        [SOFTARM, "run", CONFIG, "--duration", "3", "--out", folder, *more], check=True, capture_output=True
+    )
+    return softarm.view.read_log(folder, softarm.load_experiment(CONFIG), CONFIG)
+
+
+class Pages(unittest.TestCase):
+    def setUp(self):
+        temporary = tempfile.TemporaryDirectory()
+        self.addCleanup(temporary.cleanup)
+        self.folder = pathlib.Path(temporary.name)
+
+    def test_the_report_plays_without_a_server(self):
+        pictures = recorded(self.folder)
+        arm = softarm.Arm(softarm.load_experiment(CONFIG))
+        with browser.Page(f"file://{self.folder}/report.html") as page:
+            page.wait("window.softarmPlayer && softarmPlayer.tip")
+            first = page.value("softarmPlayer.time")
+            page.wait(f"softarmPlayer.time > {first} + 0.05", "motion")
+            page.click("pause")
+            for share in (0.2, 0.5, 0.9):
+                page.value(f"(s => {{ s.value = {share}; s.oninput(); }})(document.getElementById('time'))")
+                shown_s, tip = page.value("softarmPlayer.time"), page.value("softarmPlayer.tip")
+                picture = min(pictures, key=lambda each: abs(each.t_s - shown_s))
+                # Frames lie 1/15 s apart, points are stored to 0.1 mm.
+                np.testing.assert_allclose(tip, arm.tip(picture.u), atol=3e-3)
+            fetched = page.value("performance.getEntriesByType('resource').map(e => e.name).filter(n => !n.startsWith('data:'))")
+            self.assertEqual(fetched, [], "one file has everything")
+            self.assertEqual(page.errors, [])
+            self.assertNotIn("not ACTIVE", page.value("document.body.innerText"))
+
+    def test_the_tip_is_drawn_where_the_arm_is(self):
+        pictures = recorded(self.folder, "--no-plots")
+        experiment = softarm.load_experiment(CONFIG)
+        arm = softarm.Arm(experiment)
+        view = softarm.view.View(experiment, "127.0.0.1", 0)
+        self.addCleanup(view.server.stop)
+        size = (900, 700)
+        with browser.Page(f"http://127.0.0.1:{view.server.get_port()}/", size) as page:
+            wait_for(lambda: view.server.get_clients(), "a client")
+            (client,) = view.server.get_clients().values()
+            for picture in (pictures[0], pictures[len(pictures) // 2], pictures[-1]):
+                view.show(picture)
+                text = ", ".join(f"{1e3 * value:.1f}" for value in arm.tip(picture.u))
+                page.wait(f"(document.body?.innerText ?? '').includes({text!r})", f"the tip's place {text}")
+                wanted = self.projected(client.camera, arm.tip(picture.u))
+                self.assertIsNotNone(wanted)
+
+                def seen(near=wanted):
+                    found = self.orange(page.screenshot())
+                    return found is not None and np.linalg.norm(found - near) < 8.0
+
+                wait_for(seen, f"a tip at {wanted}")
+            self.assertEqual(page.errors, [])
+
+    @staticmethod
+    def projected(camera, point):
+        """Pixel of a point in the world, in a picture of the camera's own size; its z axis looks ahead, y down."""
+        w, x, y, z = camera.wxyz
+        rotation = np.array(
+            [
+                [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+                [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+                [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+            ]
+        )
+        ahead = rotation.T @ (point - camera.position)
+        focal = 0.5 * camera.image_height / np.tan(0.5 * camera.fov)
+        return focal * ahead[:2] / ahead[2] + 0.5 * np.array([camera.image_width, camera.image_height])
+
+    @staticmethod
+    def orange(png):
+        """Middle of the pixels of the tip's colour, (x, y); None where there are none."""
+        r, g, b = np.moveaxis(np.asarray(PIL.Image.open(io.BytesIO(png)).convert("RGB")).astype(int), -1, 0)
+        rows, columns = np.nonzero((r > 120) & (r > 2 * g) & (r > 3 * b))
+        return np.array([columns.mean(), rows.mean()]) if rows.size > 20 else None
+
+    def test_a_live_arm_and_its_buttons(self):
+        skip_without_multicast()
+        config = write_config(self.folder, "one_segment_live.yaml", own_url())
+        start(self, self.folder, BIN / "softarm-plant", config)
+        start(self, self.folder, BIN / "softarmd", config)
+        page = subprocess.Popen(
+            [SOFTARM, "view", config, "--port", "0", "--control"], stdout=subprocess.PIPE, text=True, bufsize=1
+        )
+        self.addCleanup(page.stdout.close)
+        self.addCleanup(page.wait, 30)
+        self.addCleanup(page.terminate)
+        url = next(found[1] for line in page.stdout if (found := re.search(r"(http://\S+)", line)))
+        client = softarm.ArmClient(softarm.load_experiment(config))
+
+        def mode():
+            client.wait_for_status(1.0)
+            return client.status.mode
+
+        with browser.Page(url) as shown:
+            def says(text):
+                shown.wait(f"(document.body?.innerText ?? '').includes({text!r})")
+
+            says("IDLE")
+            shown.click("arm")
+            says("arm this arm?")
+            self.assertNotEqual(mode(), "ACTIVE", "armed before the question was answered")
+            shown.click("yes")
+            says("ACTIVE")
+            wait_for(lambda: mode() == "ACTIVE", "ACTIVE")
+            shown.click("disarm")
+            shown.click("no")
+            self.assertEqual(mode(), "ACTIVE")
+            shown.click("emergency stop")
+            wait_for(lambda: mode() == "FAULT", "FAULT")
+            says("FAULT")
+            self.assertEqual(shown.errors, [])
+
+
+if __name__ == "__main__":
+    unittest.main()
