@@ -111,7 +111,7 @@ PairVector3 grown(const PairVector3& y, double strain_rate) noexcept {
 /// All points are linear in l: the columns along u grow, and that along e is r / l.
 OwnColumns<true> with_elongation(const ArcColumnTerms& t, const OwnColumns<false>& held,
                                  const Stretch<true>& stretch) noexcept {
-  const auto [grow, per_length] = stretch;
+  const double grow = stretch.strain_rate, per_length = stretch.inverse_length;
   const ArcMoments& m = t.m;
   // int r x r', int r . J_e, int r . J_e' and int J_e . r' at constant length
   const Vector3 angular = t.v.x * column(held.angular, 0) + t.v.y * column(held.angular, 1) +
