@@ -11,7 +11,7 @@
 namespace softarm {
 namespace {
 
-constexpr int kCommandCapacity = 64;
+constexpr int kCommandCapacity = 64, kRequestCapacity = 64;
 constexpr std::int64_t kStatusPeriod_ns = 100'000'000;
 
 void put(const Eigen::VectorXd& from_bar, std::vector<float>& to_bar) noexcept {
@@ -37,6 +37,8 @@ ValvesLink::ValvesLink(const LcmSettings& lcm, ValveDriver& driver)
   status_.actual_bar = measurement_.pressure_bar;
   node_.subscribe(lcm_.command_channel, kCommandCapacity,
                   [this](const ReceivedMessage& packet) { take(packet); });
+  node_.subscribe(lcm_.operator_channel, kRequestCapacity,
+                  [this](const ReceivedMessage& packet) { take_request(packet); });
 }
 
 void ValvesLink::take(const ReceivedMessage& packet) noexcept {
@@ -62,14 +64,26 @@ void ValvesLink::take(const ReceivedMessage& packet) noexcept {
   refused_ += verdict == CommandVerdict::malformed;
 }
 
+/// A stop counts however old it is; what was queued before a gap acknowledges nothing.
+void ValvesLink::take_request(const ReceivedMessage& packet) noexcept {
+  using Request = softarm_messages::operator_command_t;
+  if (!decode(packet.bytes, request_)) {
+    ++refused_;
+  } else if (request_.request == Request::EMERGENCY_STOP) {
+    driver_.emergency_stop();
+  } else if (request_.request == Request::DISARM && !discarding_) {
+    driver_.acknowledge();
+  }
+}
+
 void ValvesLink::take_until(std::int64_t deadline_ns) noexcept {
   while (monotonic_now_ns() < deadline_ns) node_.wait_until(deadline_ns);
 }
 
 void ValvesLink::drain(bool take) noexcept {
   discarding_ = !take;
-  node_.drain(
-      kCommandCapacity);  // the capacity of the queue: a flood of messages must not delay the loop
+  // The capacity of the queues: a flood of messages must not delay the loop.
+  node_.drain(kCommandCapacity + kRequestCapacity);
   discarding_ = false;
 }
 

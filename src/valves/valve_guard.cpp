@@ -39,7 +39,8 @@ const char* name(ValveReason reason) noexcept {
                                     "another sender",
                                     "set points not as written",
                                     "fail-safe time-out changed",
-                                    "pressure does not fall"};
+                                    "pressure does not fall",
+                                    "emergency stop"};
   return kNames[static_cast<int>(reason)];
 }
 
@@ -88,10 +89,14 @@ void ValveGuard::disconnect(ValveReason reason, std::int64_t now_ns) noexcept {
 }
 
 void ValveGuard::degrade(ValveReason reason, int chamber) noexcept {
+  if (emergency_stopped_) {  // whatever else is wrong
+    reason = ValveReason::emergency_stop;
+    chamber = -1;
+  }
   // A stuck valve would be found only by raising the pressure again, and of two senders one has to
   // leave, so an operator has to look first.
   if (settings_.wait_for_zero || reason == ValveReason::stuck_valve ||
-      reason == ValveReason::other_sender)
+      reason == ValveReason::other_sender || reason == ValveReason::emergency_stop)
     wait_for_zero(true);
   if (state_ != ValveState::degraded) ++counters_.times_degraded;
   good_cycles_ = 0;
@@ -118,13 +123,22 @@ CommandVerdict ValveGuard::command(const PressureCommand& command,
   const CommandVerdict verdict = expiry_.receive(command, arrival_ns);
   if (verdict != CommandVerdict::other_sender) return verdict;
   ++counters_.other_senders;
-  if (state_ == ValveState::running || state_ == ValveState::vented) {
+  // A terminal becomes ready all the same, so that the state can name the reason; and a stuck valve
+  // stays one.
+  const bool named = state_ >= ValveState::vented && reason_ != ValveReason::stuck_valve;
+  if (named) {
     degrade(ValveReason::other_sender, -1);
   } else {
-    good_cycles_ = 0;
     wait_for_zero(true);
   }
+  if (state_ == ValveState::degraded) good_cycles_ = 0;
   return verdict;
+}
+
+void ValveGuard::emergency_stop() noexcept {
+  emergency_stopped_ = true;
+  expiry_.vent();
+  if (state_ >= ValveState::vented) degrade(ValveReason::emergency_stop, -1);
 }
 
 ValveAction ValveGuard::next(std::int64_t now_ns) noexcept {
@@ -165,6 +179,7 @@ void ValveGuard::update_running(std::int64_t now_ns) noexcept {
     venting_from_bar_ = measured_bar_.maxCoeff();
   }
   if (state_ != ValveState::vented && state_ != ValveState::running) return;
+  if (emergency_stopped_) return degrade(ValveReason::emergency_stop, -1);
   if (stopping_) {
     enter(ValveState::vented, ValveReason::shutdown);
   } else if (!commanded) {
@@ -393,8 +408,8 @@ void ValveGuard::note_good_cycle() noexcept {
   // A valve that was stuck has to follow again before it counts as good.
   const bool follows = std::all_of(off_since_ns_.begin(), off_since_ns_.end(),
                                    [](std::int64_t since) { return since == kNever; });
-  const bool good =
-      zero_confirmed_ && !failsafe_lost_ && (follows || reason_ != ValveReason::stuck_valve);
+  const bool good = zero_confirmed_ && !failsafe_lost_ && !emergency_stopped_ &&
+                    (follows || reason_ != ValveReason::stuck_valve);
   good_cycles_ = good ? good_cycles_ + 1 : 0;
   if (good_cycles_ < good_cycles_needed_) return;
   chamber_ = -1;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <softarm_messages/operator_command_t.hpp>
 #include <softarm_messages/pressure_command_t.hpp>
 #include <softarm_messages/pressure_measurement_t.hpp>
 #include <softarm_messages/valves_status_t.hpp>
@@ -13,7 +14,8 @@
 
 namespace softarm {
 
-/// Passes commands to the driver and publishes its measurements and status. Use from the driver's
+/// Passes commands and emergency stops to the driver, which vents while no daemon runs too, and
+/// publishes its measurements and status. Use from the driver's
 /// thread. After construction nothing allocates or throws.
 class ValvesLink {
  public:
@@ -32,11 +34,13 @@ class ValvesLink {
   /// second. Returns whether they have changed.
   bool publish_status(std::int64_t now_ns, std::int64_t late_cycles) noexcept;
 
-  /// Commands that were malformed, for another arm, or, on one machine, not of this moment.
+  /// Commands that were malformed, for another arm, or, on one machine, not of this moment; and
+  /// requests that were malformed.
   std::int64_t refused() const noexcept { return refused_; }
 
  private:
   void take(const ReceivedMessage& packet) noexcept;
+  void take_request(const ReceivedMessage& packet) noexcept;
 
   LcmSettings lcm_;
   ValveDriver& driver_;
@@ -47,6 +51,7 @@ class ValvesLink {
   std::int64_t refused_ = 0;
   std::int64_t next_status_ns_ = 0;
   softarm_messages::pressure_command_t command_{};
+  softarm_messages::operator_command_t request_{};
   softarm_messages::pressure_measurement_t measurement_{};
   softarm_messages::valves_status_t status_{};
 };

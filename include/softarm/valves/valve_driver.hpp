@@ -32,6 +32,9 @@ class ValveDriver {
   CommandVerdict command(const PressureCommand& command, std::int64_t arrival_ns) noexcept {
     return guard_.command(command, arrival_ns);
   }
+  /// An operator's emergency stop, and the disarm that acknowledges it (ValveGuard).
+  void emergency_stop() noexcept { guard_.emergency_stop(); }
+  void acknowledge() noexcept { guard_.acknowledge(); }
   /// Carries out the guard's next action. True if pressures were written and read back.
   bool cycle(std::int64_t now_ns) noexcept;
 

@@ -42,7 +42,8 @@ enum class ValveReason : std::int8_t {
   other_sender,      ///< two programs command the arm
   echo_mismatch,     ///< the terminal holds other set points than were written
   failsafe_changed,  ///< its time-out is no longer what was set
-  zero_unconfirmed   ///< pressures do not fall: the driver is silent so that the terminal vents
+  zero_unconfirmed,  ///< pressures do not fall: the driver is silent so that the terminal vents
+  emergency_stop     ///< an operator's, until `acknowledge`
 };
 /// Name in messages, in static storage; empty for none.
 const char* name(ValveReason reason) noexcept;
@@ -99,7 +100,7 @@ class ValveGuard {
   bool wake(std::int64_t now_ns, bool paused = false) noexcept;
 
   /// By the rules of CommandExpiry. A command of another sender than that of the one in force
-  /// vents.
+  /// vents, and is the reason of DEGRADED as long as they come.
   CommandVerdict command(const PressureCommand& command, std::int64_t arrival_ns) noexcept;
 
   /// The action to take now.
@@ -122,6 +123,12 @@ class ValveGuard {
   bool may_write() const noexcept;
   /// Result of writing `set_points_bar`.
   void written(LinkResult result, std::int64_t now_ns) noexcept;
+
+  /// An operator's emergency stop: DEGRADED, now or once connected, until `acknowledge`, whoever
+  /// commands. Then commands must have been zero, or silent, once.
+  void emergency_stop() noexcept;
+  /// An operator's disarm.
+  void acknowledge() noexcept { emergency_stopped_ = false; }
 
   /// From now on every set point is zero.
   void stop() noexcept;
@@ -191,6 +198,7 @@ class ValveGuard {
   bool must_see_zero_;
   bool silence_is_zero_ = true;
   bool rising_ = true;  ///< on the way from vented to what is commanded
+  bool emergency_stopped_ = false;
   bool stopping_ = false;
   bool zero_confirmed_ = true;
   Eigen::VectorXd set_points_bar_;

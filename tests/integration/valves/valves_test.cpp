@@ -259,6 +259,57 @@ TEST_F(ValvesBehindARelay, WithExplicitArmingCommandsOfZeroComeFirst) {
   expect_recovery();
 }
 
+// Whoever commands the valves: no daemon runs here.
+TEST_F(ValvesBehindARelay, AnEmergencyStopVentsWithoutADaemonUntilItIsAcknowledged) {
+  begin();
+  ASSERT_TRUE(run_at(0.3)) << driver_->printed();
+  const auto request = [&](std::int8_t kind) {
+    node_->publish("SOFTARM_OPERATOR",
+                   softarm_messages::operator_command_t{.sequence = 1, .nonce = 0, .request = kind});
+  };
+  using Request = softarm_messages::operator_command_t;
+  ASSERT_TRUE(command_until(0.3, [&] {
+    request(Request::EMERGENCY_STOP);
+    return is(ValveState::degraded, ValveReason::emergency_stop) && pressure_is(0.0);
+  })) << driver_->printed();
+  const int before = measurements_;
+  bool pressurised = false;
+  EXPECT_TRUE(command_until(0.3, [&] {
+    pressurised |= !pressure_is(0.0);
+    return measurements_ > before + 20;
+  }));
+  EXPECT_FALSE(pressurised);
+  EXPECT_NE(driver_->printed().find("DEGRADED (emergency stop)"), std::string::npos);
+  EXPECT_TRUE(command_until(0.0, [&] {
+    request(Request::DISARM);
+    return is(ValveState::running, ValveReason::none);
+  })) << driver_->printed();
+  expect_recovery();
+}
+
+// It is vented, but by name, and the one who stays is obeyed.
+TEST_F(ValvesBehindARelay, AFloodOfCommandsFromTheBeginningIsNamed) {
+  configure(1);
+  plant_process_ = start_terminal();
+  configure(plant_process_->port());
+  softarm_messages::pressure_command_t theirs = sent_;
+  theirs.pressure_bar.assign(kChambers, 2.0F);
+  driver_ = start("softarm-valves");
+  bool pressurised = false;
+  EXPECT_TRUE(command_until(0.3, [&] {
+    for (int k = 0; k < 50; ++k) {
+      theirs.sequence = sent_.sequence + 1'000'000 + k;
+      node_->publish("SOFTARM_PRESSURE_COMMAND", theirs);
+    }
+    pressurised |= largest(plant_.pressure_bar) > 0.0;
+    return is(ValveState::degraded, ValveReason::other_sender);
+  })) << driver_->printed();
+  EXPECT_FALSE(pressurised);
+  EXPECT_TRUE(command_until(0.0, [&] { return is(ValveState::running, ValveReason::none); }))
+      << driver_->printed();
+  expect_recovery();
+}
+
 TEST_F(ValvesBehindARelay, ASecondDriverIsKeptOut) {
   begin();
   ASSERT_TRUE(wait_for([&] { return valves().state == ValveState::vented; })) << driver_->printed();

@@ -63,9 +63,9 @@ struct ProofOfGuard {
           connected ? it.good_cycles_ : 0})
       words.push_back(value);
     std::int64_t flags = 0;
-    for (const bool flag :
-         {connected && it.failsafe_lost_, connected && it.was_read_, it.must_see_zero_,
-          it.silence_is_zero_, it.rising_, it.stopping_, it.zero_confirmed_, known})
+    for (const bool flag : {connected && it.failsafe_lost_, connected && it.was_read_,
+                            it.must_see_zero_, it.silence_is_zero_, it.rising_,
+                            it.emergency_stopped_, it.stopping_, it.zero_confirmed_, known})
       flags = 2 * flags + (flag ? 1 : 0);
     words.push_back(flags);
     words.push_back(connected ? std::bit_cast<std::int64_t>(it.venting_from_bar_) : 0);
@@ -121,6 +121,8 @@ enum class Event {
   foreign_write,   // another master wrote full pressure
   stuck,           // the pressure does not move
   stop,
+  emergency_stop,  // an operator's,
+  disarm,          // and what acknowledges it
   count
 };
 constexpr std::array<const char*, static_cast<std::size_t>(Event::count)> kEventNames = {
@@ -141,7 +143,9 @@ constexpr std::array<const char*, static_cast<std::size_t>(Event::count)> kEvent
     "fail-safe wrong",
     "foreign write",
     "stuck",
-    "stop"};
+    "stop",
+    "emergency stop",
+    "disarm"};
 
 enum class Sent { nothing, zero, full, older, foreign, shadow, malformed, count };
 constexpr std::array<const char*, static_cast<std::size_t>(Sent::count)> kSentNames = {
@@ -168,7 +172,8 @@ struct Onlooker {
   std::int64_t command_ns = kNever;  ///< arrival of the newest command of the sender
   double command_bar = 0.0;
   bool stopped = false;
-  bool own = true;  ///< what the terminal holds was written by the guard
+  bool emergency = false;  ///< stopped by an operator, and not acknowledged
+  bool own = true;         ///< what the terminal holds was written by the guard
 };
 
 struct State {
@@ -217,6 +222,7 @@ void judge_write(State& state, double before_bar, bool read, bool answered) {
     require(bar == 0.0, "only RUNNING writes pressure");
   if (bar == 0.0) return;
   require(!seen.stopped, "no pressure after a stop");
+  require(!seen.emergency, "no pressure after an emergency stop");
   require(read && answered, "no pressure without a read-back in the same cycle");
   require(seen.command_ns != kNever && seen.now_ns - seen.command_ns < kValidity,
           "no pressure without a command that is valid");
@@ -303,6 +309,15 @@ void step(State& state, const Step& input) {
     state.guard.stop();
     seen.stopped = true;
   }
+  if (event == Event::emergency_stop) {
+    state.guard.emergency_stop();
+    seen.emergency = true;
+    require(state.guard.set_points_bar()[0] == 0.0, "an emergency stop vents at once");
+  }
+  if (event == Event::disarm) {
+    state.guard.acknowledge();
+    seen.emergency = false;
+  }
   const bool listen = state.guard.wake(seen.now_ns, event == Event::paused);
   if (event == Event::paused) seen.command_ns = kNever;
   if (listen && input.sent != Sent::nothing) {
@@ -342,6 +357,8 @@ void step(State& state, const Step& input) {
       break;
   }
   if (state.guard.state() == ValveState::disconnected) terminal.open = false;
+  if (seen.emergency && state.guard.state() == ValveState::degraded)
+    require(state.guard.reason() == ValveReason::emergency_stop, "an emergency stop is named");
   // Whatever the terminal does with what is written, its pressure goes when the right to it has:
   // falling is given one time-out, silence one, and a cycle for each of noticing and doing.
   if (terminal.held_bar > 0.0 && terminal.secured && seen.own)
@@ -364,8 +381,8 @@ ProofOfGuard::Words words_of(const State& state) {
                                             : std::max(seen.command_ns - seen.now_ns, -kValidity));
   for (const double bar : {terminal.held_bar, terminal.actual_bar, seen.command_bar})
     words.push_back(std::bit_cast<std::int64_t>(bar));
-  words.push_back((terminal.open ? 8 : 0) + (terminal.secured ? 4 : 0) + (seen.stopped ? 2 : 0) +
-                  (seen.own ? 1 : 0));
+  words.push_back((seen.emergency ? 16 : 0) + (terminal.open ? 8 : 0) + (terminal.secured ? 4 : 0) +
+                  (seen.stopped ? 2 : 0) + (seen.own ? 1 : 0));
   return words;
 }
 
@@ -436,6 +453,7 @@ class Exploration {
         ++count_.steps;
       }
     };
+    step(state, {Event::disarm, Sent::nothing});
     go(Sent::nothing, 40);
     go(Sent::zero, 10);
     go(Sent::full, 10);
