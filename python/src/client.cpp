@@ -113,7 +113,7 @@ void bind_client(py::module_& module) {
           "send_reference",
           [](ArmClient& arm, const VectorXd& u, const VectorXd& velocity,
              const VectorXd& acceleration) {
-            const Eigen::Index dof = arm.experiment().arm.dof();
+            const Eigen::Index dof = 2 * arm.experiment().arm.size();
             arm.send_reference(expect(u, dof, "u"), expect(velocity, dof, "velocity"),
                                expect(acceleration, dof, "acceleration"));
           },

@@ -128,7 +128,8 @@ void bind_allocator(py::module_& module) {
   py::class_<PressureAllocator>(module, "Allocator",
                                 "From actuation torques to chamber pressures, and back.")
       .def(py::init([](const Experiment& experiment) {
-             return std::make_unique<PressureAllocator>(experiment.actuation);
+             return std::make_unique<PressureAllocator>(experiment.actuation,
+                                                        experiment.arm.extensible);
            }),
            py::arg("experiment"))
       .def_property_readonly("chambers", &PressureAllocator::chambers)
@@ -136,8 +137,7 @@ void bind_allocator(py::module_& module) {
           "allocate",
           [](const PressureAllocator& allocator, const VectorXd& tau) {
             Allocation allocation;
-            allocator.allocate(expect(tau, 2 * allocator.segments(), "tau_actuation_nm"),
-                               allocation);
+            allocator.allocate(expect(tau, allocator.dimension(), "tau_actuation_nm"), allocation);
             return py::make_tuple(VectorXd(allocation.pressures_bar), VectorXd(allocation.scale));
           },
           py::arg("tau_actuation_nm"),
@@ -147,7 +147,7 @@ void bind_allocator(py::module_& module) {
       .def(
           "generalized_force",
           [](const PressureAllocator& allocator, const VectorXd& pressures) {
-            VectorXd force(2 * allocator.segments());
+            VectorXd force(allocator.dimension());
             allocator.generalized_force(expect(pressures, allocator.chambers(), "pressure_bar"),
                                         force);
             return force;

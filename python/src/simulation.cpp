@@ -80,7 +80,7 @@ py::dict run(const Experiment& experiment, double duration_s) {
   if (!(duration_s > 0.0) || !std::isfinite(duration_s)) {
     throw std::invalid_argument("duration_s: expected a time > 0 in s");
   }
-  const int dof = experiment.arm.dof();
+  const int dof = 2 * experiment.arm.size();
   const auto ticks = static_cast<Eigen::Index>(std::llround(duration_s * experiment.rate_hz));
   const int chambers = chamber_count(experiment.actuation);
   using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;

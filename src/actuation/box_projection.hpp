@@ -1,6 +1,7 @@
-// The point of a box nearest to another, on the flat W p = t of one or two equations.
+// The point of a box nearest to another, on the flat W p = t of one to three equations.
 #pragma once
 
+#include <Eigen/Dense>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -50,7 +51,7 @@ class BoxProjection {
  private:
   static double dot(const Column& a, const Column& b) noexcept {
     double sum = a[0] * b[0];
-    if constexpr (Dimension == 2) sum += a[1] * b[1];
+    for (int i = 1; i < Dimension; ++i) sum += a[i] * b[i];
     return sum;
   }
 
@@ -59,6 +60,25 @@ class BoxProjection {
 
   /// x = (sum over free columns w w')^-1 y; false if they do not span.
   bool solve_gram(const Column& y, Column& x) const noexcept {
+    if constexpr (Dimension == 3) {
+      Eigen::Matrix3d gram = Eigen::Matrix3d::Zero();
+      for (int j = 0; j < size_; ++j) {
+        if (side_[j] != 0) continue;
+        const Eigen::Map<const Eigen::Vector3d> w(columns_[j].data());
+        gram += w * w.transpose();
+      }
+      Eigen::Matrix3d adjugate;  // of a symmetric matrix
+      for (int i = 0; i < 3; ++i)
+        adjugate.col(i) = gram.col((i + 1) % 3).cross(gram.col((i + 2) % 3));
+      const double determinant = gram.col(0).dot(adjugate.col(0));
+      Eigen::Map<Eigen::Vector3d>(x.data()) =
+          adjugate * Eigen::Map<const Eigen::Vector3d>(y.data()) / determinant;
+      return determinant > 1e-15 * gram(0, 0) * gram(1, 1) * gram(2, 2);
+    } else {
+      return solve_small_gram(y, x);
+    }
+  }
+  bool solve_small_gram(const Column& y, Column& x) const noexcept {
     double a = 0.0;
     [[maybe_unused]] double b = 0.0, c = 0.0;
     for (int j = 0; j < size_; ++j) {

@@ -97,10 +97,15 @@ void check_span(int segment, const ChamberMap<D>& map, const ActuationSettings& 
 
 }  // namespace
 
-PressureAllocator::PressureAllocator(const ActuationSettings& settings)
+PressureAllocator::PressureAllocator(const ActuationSettings& settings, bool extensible)
     : segments_(static_cast<int>(settings.segments.size())),
       planar_(settings.plane_rad.has_value()) {
   check_limits(settings);
+  if (extensible && (planar_ || settings.kind == ActuationKind::torque)) {
+    throw std::invalid_argument(
+        "chambers: expected of segments that stretch pressures and no plane, got a planar arm or "
+        "actuation by torque");
+  }
   // f along (cos phi, sin phi) is tau_A along (-sin phi, cos phi): the columns of A_chamber^-1.
   if (planar_) plane_ = {-std::sin(*settings.plane_rad), std::cos(*settings.plane_rad)};
   for (int i = 0; i < segments_; ++i) {
@@ -129,6 +134,11 @@ PressureAllocator::PressureAllocator(const ActuationSettings& settings)
     } else {
       segment.spatial = ChamberMap<2>(spatial, lo, hi, settings.bias_pressure_bar);
       check_span(i, segment.spatial, settings);
+    }
+    if (extensible) {
+      const Eigen::RowVectorXd areas = axial_input_map(settings.kind, chambers);
+      axial_.emplace_back(spatial, std::vector<double>(areas.begin(), areas.end()), lo, hi,
+                          settings.bias_pressure_bar);
     }
     segment_.push_back(segment);
     chambers_ += static_cast<int>(chambers.size());
@@ -161,8 +171,16 @@ void PressureAllocator::allocate(ConstVectorRef tau_actuation_nm, Allocation& ou
     return;
   }
   std::array<double, kMaxChambersPerSegment> pressures{};
+  const bool extensible = !axial_.empty();
   for (int i = 0; i < segments_; ++i) {
     const Segment& segment = segment_[i];
+    if (extensible) {
+      const Eigen::Vector3d tau = tau_actuation_nm.segment<3>(3 * i);
+      out.scale[i] = axial_[i].allocate({tau.x(), tau.y()}, tau.z(), pressures);
+      out.saturated |= out.scale[i] < 1.0;
+      std::copy_n(pressures.begin(), chambers_of(i), out.pressures_bar.data() + segment.first);
+      continue;
+    }
     const double x = tau_actuation_nm[2 * i], y = tau_actuation_nm[2 * i + 1];
     out.scale[i] = planar_ ? segment.planar.allocate({plane_[0] * x + plane_[1] * y}, pressures)
                            : segment.spatial.allocate({x, y}, pressures);
@@ -179,7 +197,10 @@ void PressureAllocator::torque(ConstVectorRef pressures_bar,
   }
   for (int i = 0; i < segments_; ++i) {
     const double* pressures = pressures_bar.data() + segment_[i].first;
-    if (planar_) {
+    if (!axial_.empty()) {
+      const std::array<double, 2> moment = axial_[i].torque(pressures);
+      tau_actuation_nm.segment<3>(3 * i) << moment[0], moment[1], axial_[i].axial_force(pressures);
+    } else if (planar_) {
       const double moment = segment_[i].planar.torque(pressures)[0];
       tau_actuation_nm[2 * i] = plane_[0] * moment;
       tau_actuation_nm[2 * i + 1] = plane_[1] * moment;
@@ -194,10 +215,11 @@ void PressureAllocator::torque(ConstVectorRef pressures_bar,
 void PressureAllocator::generalized_force(ConstVectorRef pressures_bar,
                                           VectorRef force_nm) const noexcept {
   torque(pressures_bar, force_nm);
-  for (int i = 0; i < segments_; ++i) {
-    const double tau_x = force_nm[2 * i];
-    force_nm[2 * i] = force_nm[2 * i + 1];
-    force_nm[2 * i + 1] = -tau_x;
+  const Eigen::Index width = axial_.empty() ? 2 : 3;
+  for (Eigen::Index i = 0; i < width * segments_; i += width) {
+    const double tau_x = force_nm[i];
+    force_nm[i] = force_nm[i + 1];
+    force_nm[i + 1] = -tau_x;
   }
 }
 

@@ -14,6 +14,7 @@ namespace {
 /// Of two suffixes that match, the first counts.
 constexpr std::array kUnits = std::to_array<std::pair<std::string_view, std::string_view>>({
     {"_nm_per_rad_s", "N m/(rad s)"},
+    {"_n_per_m_s", "N/(m s)"},
     {"_nm_per_rad3", "N m/rad^3"},
     {"_nm_per_rad", "N m/rad"},
     {"_nms_per_rad", "N m s/rad"},

@@ -167,7 +167,7 @@ std::string ArmClient::other_commander() const {
 
 void ArmClient::send_reference(ConstVectorRef u_rad, ConstVectorRef velocity_radps,
                                ConstVectorRef acceleration_radps2) {
-  const int dof = experiment().arm.dof();
+  const int dof = 2 * experiment().arm.size();
   softarm_messages::curvature_reference_t message;
   message.dimension = static_cast<std::int16_t>(dof);
   message.u_rad = checked(u_rad, dof, "u");

@@ -107,7 +107,7 @@ struct Place {
 };
 
 std::vector<Place> places(const Experiment& e) {
-  const std::vector<double> straight(static_cast<std::size_t>(e.arm.dof()), 0.0);
+  const std::vector<double> straight(static_cast<std::size_t>(2 * e.arm.size()), 0.0);
   std::vector<Place> out;
   // Polar gains K_P / theta^2 have no meaning at theta = 0, which (24) only passes.
   if (e.control.coordinates == ControlCoordinates::u)
@@ -177,7 +177,7 @@ Experiment on_declared_arm(Experiment e) {
   // The observer tunes itself by what it sees.
   plant.mocap.position_noise_m = e.estimation.position_noise_m;
   plant.mocap.orientation_noise_rad = e.estimation.orientation_noise_rad;
-  plant.initial_u_rad = SegmentVector::Zero(e.arm.dof());
+  plant.initial_u_rad = SegmentVector::Zero(2 * e.arm.size());
   plant.payload_kg.assign(e.arm.segments.size(), 0.0);
   e.plant = plant;
   return e;

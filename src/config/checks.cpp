@@ -16,6 +16,7 @@
 #include "softarm/base/time.hpp"
 #include "softarm/control/curvature_controller.hpp"
 #include "softarm/control/reference.hpp"
+#include "softarm/runtime/elongation_reference.hpp"
 #include "softarm/runtime/safety_monitor.hpp"
 #include "softarm/valves/register_map.hpp"
 
@@ -116,12 +117,41 @@ class Checks {
             "a radius");
   }
 
-  /// The simulated arm may stretch; estimator and controller do not know it.
+  /// What the controller needs of an arm that stretches.
+  void check_stretching_control() const {
+    const char* key = "arm.extensible";
+    const auto no = [&](bool holds, const char* with) {
+      require(!holds, key, fmt::format("false with {}", with), "segments that stretch");
+    };
+    no(experiment_.arm.size() > kMaxStretchingSegments, "more than 85 segments");
+    no(experiment_.arm.actuation == ActuationModel::couple,
+       "actuation_model: couple, which has no axial force");
+    no(experiment_.actuation.kind == ActuationKind::torque,
+       "actuation by torque, which has no axial force");
+    no(experiment_.actuation.plane_rad.has_value(), "actuation.plane_rad");
+    no(experiment_.control.coordinates == ControlCoordinates::polar, "control.coordinates: polar");
+    no(experiment_.estimation.observer == ObserverKind::model, "estimation.observer: model");
+    no(experiment_.estimation.method == CurvatureMethod::orientation,
+       "estimation.method: orientation, which measures no lengths");
+    for (const SegmentParameters& segment : experiment_.arm.segments) {
+      if (segment.constant_length) continue;
+      above("arm.axial_stiffness_n_per_m", segment.axial_stiffness_n_per_m, 0.0, "zero",
+            " where segments stretch");
+      above("arm.axial_damping_ns_per_m", segment.axial_damping_ns_per_m, 0.0, "zero",
+            " where segments stretch");
+    }
+    const SegmentScalars natural_m = straight_elongation(experiment_.arm, experiment_.actuation,
+                                                         experiment_.actuation.bias_pressure_bar);
+    for (int i = 0; i < experiment_.arm.size(); ++i) {
+      const double length_m = experiment_.arm.segments[static_cast<std::size_t>(i)].length_m;
+      above("estimation.length_tolerance", experiment_.estimation.length_tolerance,
+            std::abs(natural_m[i]) / length_m, "the elongation by the bias pressures",
+            ": otherwise every frame is rejected");
+    }
+  }
+
   void check_stretch() const {
-    require(!experiment_.arm.extensible, "arm.extensible",
-            "false: the controller has no segments that stretch yet, only the simulated arm has "
-            "(plant.arm.extensible)",
-            "segments that stretch");
+    if (experiment_.arm.extensible) check_stretching_control();
     const PlantSettings& plant = experiment_.plant;
     if (!plant.arm.extensible) return;
     require(plant.arm.actuation == ActuationModel::chamber, "plant.arm.extensible",

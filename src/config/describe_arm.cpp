@@ -179,6 +179,13 @@ static void describe(Keys& key, ControllerSettings& it) {
       "K_P: one for all, one a segment, or [x, y] a segment (polar: [phi, theta])", kRequired);
   key("kd_nms_per_rad", it.kd, from(0, 1e3).one_or_pairs(), "K_D, in the same forms");
   key("ki_nm_per_rad_s", it.ki, gains, "integral gain on u, in the same forms; not in the paper");
+  for (auto* each : {&it.kp_axial, &it.kd_axial, &it.ki_axial})
+    each->resize(static_cast<std::size_t>(key.segments), 0.0);
+  key("kp_axial_n_per_m", it.kp_axial, from(0, 1e7).one_or_each(),
+      "K_P along e of segments that stretch, of all or of every segment");
+  key("kd_axial_ns_per_m", it.kd_axial, from(0, 1e6).one_or_each(), "K_D along e, likewise");
+  key("ki_axial_n_per_m_s", it.ki_axial, from(0, 1e7).one_or_each(),
+      "integral gain on e, likewise");
   KEY(disturbance, one_of({"cancel", "model_only", "none"}),
       "what the model observer found: cancel (parameters and disturbance), model_only (parameters; "
       "the arm stays soft), none");

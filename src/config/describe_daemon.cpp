@@ -5,6 +5,22 @@
 
 namespace softarm {
 
+static void describe_elongation(Keys& key, ReferencePhase& phase) {
+  const bool curvatures =
+      !phase.kind.is_tip_path() && phase.kind.get_if<LiveReference>() == nullptr;
+  key.when(curvatures, [&] {
+    ElongationPath& it = phase.elongation;
+    key.section({"elongation",
+                 "of every segment that stretches, mean + amplitude sin(rate t), as far as "
+                 "pressures can"},
+                [&] {
+                  KEY(mean_m, from(-1, 1), "left out: that of the bias pressures");
+                  KEY(amplitude_m, from(-1, 1), "of every segment");
+                  KEY(rate_radps, from(0, 100), "t = 0 where the phase begins");
+                });
+  });
+}
+
 void describe_reference(Keys& key, ReferenceSettings& it) {
   const auto names = reference_kinds().names();
   const Key list = {"reference", "phases one after the other; time starts at ACTIVE", kRequired};
@@ -20,6 +36,7 @@ void describe_reference(Keys& key, ReferenceSettings& it) {
           "of the phase; the last one has none and does not end", kRequired);
     });
     phase.kind.describe(key);
+    describe_elongation(key, phase);
   });
 }
 

@@ -8,6 +8,7 @@
 
 #include "softarm/base/time.hpp"
 #include "softarm/control/reach.hpp"
+#include "softarm/runtime/elongation_reference.hpp"
 #include "softarm/runtime/safety_monitor.hpp"
 
 namespace softarm {
@@ -144,17 +145,25 @@ struct OutOfReach {
   double part = 0.0;
 };
 
+/// Of segments that stretch, with all chambers at the highest pressure; otherwise empty.
+SegmentScalars most_elongation_m(const Experiment& experiment) {
+  if (!experiment.arm.extensible) return {};
+  return straight_elongation(experiment.arm, experiment.actuation,
+                             experiment.actuation.max_pressure_bar);
+}
+
 OutOfReach out_of_reach(const Experiment& experiment, const TipPathReference& path) {
   constexpr int kInstants = 72;
   TipPathReference unit = path;
   unit.rate_radps = 1.0;
   const int instants = path.shape == TipPathShape::point ? 1 : kInstants;
   Eigen::VectorXd u = Eigen::VectorXd::Zero(experiment.arm.dof());
+  const SegmentScalars stretch_m = most_elongation_m(experiment);
   OutOfReach out;
   for (int k = 0; k < instants; ++k) {
     const double away_m = distance_out_of_reach_m(
         experiment.arm, experiment.control.max_theta_rad, experiment.actuation.plane_rad,
-        unit.tip(2.0 * std::numbers::pi * k / instants).position_m, u);
+        unit.tip(2.0 * std::numbers::pi * k / instants).position_m, u, stretch_m);
     if (away_m > kReachTolerance * length_m(experiment.arm)) out.part += 1.0 / instants;
     out.longest_m = std::max(out.longest_m, away_m);
   }
@@ -162,7 +171,7 @@ OutOfReach out_of_reach(const Experiment& experiment, const TipPathReference& pa
 }
 
 void warn_of_paths(const Experiment& experiment, std::vector<std::string>& warnings) {
-  const double arm_m = length_m(experiment.arm);
+  const double arm_m = length_m(experiment.arm) + most_elongation_m(experiment).sum();
   for (std::size_t i = 0; i < experiment.reference.phases.size(); ++i) {
     const auto* path = experiment.reference.phases[i].kind.get_if<TipPathReference>();
     if (path == nullptr) continue;

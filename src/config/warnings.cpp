@@ -11,7 +11,9 @@
 #include "softarm/control/gain_check.hpp"
 #include "softarm/control/reference.hpp"
 #include "softarm/model/actuation_matrix.hpp"
+#include "softarm/model/coordinates.hpp"
 #include "softarm/model/statics.hpp"
+#include "softarm/runtime/elongation_reference.hpp"
 #include "softarm/runtime/safety_monitor.hpp"
 #include "softarm/runtime/settings.hpp"
 #include "softarm/transport/lcm_node.hpp"
@@ -24,11 +26,18 @@ namespace {
 class StaticReach {
  public:
   explicit StaticReach(const Experiment& experiment)
-      : arm_(experiment.arm), workspace_(experiment.arm), allocator_(experiment.actuation) {}
+      : arm_(experiment.arm),
+        workspace_(experiment.arm),
+        allocator_(experiment.actuation, experiment.arm.extensible) {
+    if (arm_.extensible)
+      natural_m_ =
+          straight_elongation(arm_, experiment.actuation, experiment.actuation.bias_pressure_bar);
+  }
 
   /// The smallest part s of the torque that a segment's chambers give in this pose (2n, rad).
   double scale(const std::vector<double>& u_rad) {
-    const Eigen::VectorXd u = Eigen::Map<const Eigen::VectorXd>(u_rad.data(), arm_.dof());
+    const Eigen::VectorXd u = coordinates(
+        arm_, Eigen::Map<const Eigen::VectorXd>(u_rad.data(), 2 * arm_.size()), natural_m_);
     Eigen::VectorXd force(arm_.dof());
     static_moments(arm_, workspace_, u, force);
     Eigen::VectorXd tau(arm_.dof());
@@ -68,6 +77,7 @@ class StaticReach {
   }
 
   const ArmParameters& arm_;
+  SegmentScalars natural_m_;
   DynamicsWorkspace workspace_;
   PressureAllocator allocator_;
 };

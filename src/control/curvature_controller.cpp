@@ -11,10 +11,11 @@
 namespace softarm {
 namespace {
 
-SegmentVector gains(const char* name, const std::vector<double>& values, int dof) {
-  if (values.size() != static_cast<std::size_t>(dof)) {
-    throw std::invalid_argument(fmt::format("control, {}: expected {} gains (2 a segment), got {}",
-                                            name, dof, values.size()));
+void check_gains(const char* name, const std::vector<double>& values, int expected,
+                 const char* each) {
+  if (values.size() != static_cast<std::size_t>(expected)) {
+    throw std::invalid_argument(fmt::format("control, {}: expected {} gains ({} a segment), got {}",
+                                            name, expected, each, values.size()));
   }
   for (double value : values) {
     if (!std::isfinite(value) || value < 0.0) {
@@ -22,7 +23,21 @@ SegmentVector gains(const char* name, const std::vector<double>& values, int dof
           fmt::format("control, {}: expected finite gains >= 0, got {}", name, value));
     }
   }
-  return Eigen::Map<const Eigen::VectorXd>(values.data(), dof);
+}
+
+/// In the order of the coordinates: two a segment and, where segments stretch, one along e.
+SegmentVector gains(const char* name, const ArmParameters& arm, const std::vector<double>& bending,
+                    const std::vector<double>& axial) {
+  const int n = arm.size(), width = arm.segment_dof();
+  check_gains(name, bending, 2 * n, "2");
+  if (!axial.empty()) check_gains(name, axial, n, "1 along e");
+  SegmentVector out(arm.dof());
+  for (int i = 0; i < n; ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    out.segment<2>(width * i) << bending[2 * k], bending[2 * k + 1];
+    if (arm.extensible) out[width * i + 2] = axial.empty() ? 0.0 : axial[k];
+  }
+  return out;
 }
 
 /// One segment in polar coordinates, bounded at theta = 0.
@@ -82,14 +97,19 @@ CurvatureController::CurvatureController(const ArmParameters& arm,
     : arm_(arm),
       settings_(settings),
       workspace_(arm),
-      kp_(gains("kp", settings.kp, arm.dof())),
-      kd_(gains("kd", settings.kd, arm.dof())),
+      kp_(gains("kp", arm, settings.kp, settings.kp_axial)),
+      kd_(gains("kd", arm, settings.kd, settings.kd_axial)),
       ki_(settings.ki.empty() ? SegmentVector::Zero(arm.dof())
-                              : gains("ki", settings.ki, arm.dof())),
+                              : gains("ki", arm, settings.ki, settings.ki_axial)),
       integral_(SegmentVector::Zero(arm.dof())),
       horizontal_(arm),
       integrates_(!ki_.isZero(0.0)) {
-  expect_constant_length(arm, "control");
+  if (arm.extensible && (settings.coordinates == ControlCoordinates::polar ||
+                         arm.actuation != ActuationModel::chamber)) {
+    throw std::invalid_argument(
+        "control: expected of segments that stretch coordinates u and actuation by chamber, got "
+        "polar or couple");
+  }
   if (!std::isfinite(settings.valve_lag_s) || settings.valve_lag_s < 0.0) {
     throw std::invalid_argument(
         fmt::format("control, valve_lag_s: expected a time >= 0, got {}", settings.valve_lag_s));
@@ -102,10 +122,14 @@ CurvatureController::CurvatureController(const ArmParameters& arm,
   const int dof = arm.dof();
   stiffness_.setZero(dof);
   damping_.setZero(dof);
+  const int width = arm.segment_dof();
   for (int i = 0; i < dof; ++i) {
-    const SegmentParameters& segment = arm.segments[static_cast<std::size_t>(i / 2)];
-    if (settings.terms.stiffness) stiffness_[i] = segment.stiffness_nm_per_rad;
-    if (settings.terms.damping) damping_[i] = segment.damping_nms_per_rad;
+    const SegmentParameters& segment = arm.segments[static_cast<std::size_t>(i / width)];
+    const bool axial = i % width == 2;
+    if (settings.terms.stiffness)
+      stiffness_[i] = axial ? segment.axial_stiffness_n_per_m : segment.stiffness_nm_per_rad;
+    if (settings.terms.damping)
+      damping_[i] = axial ? segment.axial_damping_ns_per_m : segment.damping_nms_per_rad;
   }
   for (SegmentVector* v :
        {&velocity_ref_, &acceleration_ref_, &before_, &after_, &along_x_, &along_y_})
@@ -123,8 +147,10 @@ void CurvatureController::compute(ConstVectorRef u, ConstVectorRef velocity,
   out.tau_u_nm.resize(arm_.dof());
   out.tau_actuation_nm.resize(arm_.dof());
   out.bounded = false;
-  if (settings_.coordinates == ControlCoordinates::u) {
-    feedback_u(u, velocity, reference.now, out);
+  if (arm_.extensible) {
+    feedback_u<3>(u, velocity, reference.now, out);
+  } else if (settings_.coordinates == ControlCoordinates::u) {
+    feedback_u<2>(u, velocity, reference.now, out);
   } else {
     feedback_polar(u, velocity, reference.now, out);
   }
@@ -141,17 +167,18 @@ void CurvatureController::compute(ConstVectorRef u, ConstVectorRef velocity,
   }
 }
 
-// (17) in u.
+// (17) in u, or in (u, e).
+template <int Width>
 void CurvatureController::feedback_u(ConstVectorRef u, ConstVectorRef velocity,
                                      const ReferenceSample& r, ControlOutput& out) noexcept {
   const DynamicsTerms terms{settings_.terms.inertia, settings_.terms.coriolis,
                             settings_.terms.gravity};
   inverse_dynamics(arm_, workspace_, u, velocity, r.velocity, r.acceleration, terms, out.tau_u_nm);
-  for (Eigen::Index i = 0; i < u.size(); i += 2) {  // two a segment: fixed sizes, no remainders
-    const auto at = [i](const auto& v) { return v.template segment<2>(i).array(); };
-    out.tau_u_nm.segment<2>(i).array() += at(stiffness_) * at(r.u) + at(damping_) * at(r.velocity) +
-                                          at(kp_) * (at(r.u) - at(u)) +
-                                          at(kd_) * (at(r.velocity) - at(velocity));
+  for (Eigen::Index i = 0; i < u.size(); i += Width) {  // a segment: fixed sizes, no remainders
+    const auto at = [i](const auto& v) { return v.template segment<Width>(i).array(); };
+    out.tau_u_nm.segment<Width>(i).array() +=
+        at(stiffness_) * at(r.u) + at(damping_) * at(r.velocity) + at(kp_) * (at(r.u) - at(u)) +
+        at(kd_) * (at(r.velocity) - at(velocity));
   }
 }
 
@@ -194,10 +221,11 @@ void CurvatureController::integrate(double period_s, ConstVectorRef u,
                                     const ReferenceSample& reference,
                                     ConstVectorRef scale) noexcept {
   if (!integrates_) return;
+  const Eigen::Index width = arm_.segment_dof();
   for (Eigen::Index i = 0; i < u.size(); ++i) {
     const double growth = period_s * ki_[i] * (reference.u[i] - u[i]);
     // Out of reach already: more of the same would only have to be undone later.
-    if (scale[i / 2] >= 1.0 || growth * integral_[i] < 0.0) integral_[i] += growth;
+    if (scale[i / width] >= 1.0 || growth * integral_[i] < 0.0) integral_[i] += growth;
   }
 }
 
@@ -220,10 +248,11 @@ void CurvatureController::add_correction(const ModelCorrection& correction, Cons
                                          const ReferenceSample& r,
                                          SegmentVector& force_nm) noexcept {
   if (settings_.terms.gravity) horizontal_.rows(u, workspace_, along_x_, along_y_);
+  const int width = arm_.segment_dof();
   for (int i = 0; i < arm_.size(); ++i) {
     const SegmentCorrection& off = correction.segment[static_cast<std::size_t>(i)];
-    const auto at = [i](const auto& v) { return v.template segment<2>(2 * i).array(); };
-    auto force = force_nm.segment<2>(2 * i).array();
+    const auto at = [=](const auto& v) { return v.template segment<2>(width * i).array(); };
+    auto force = force_nm.segment<2>(width * i).array();
     force += off.stiffness * at(stiffness_) * at(r.u) + off.damping * at(damping_) * at(r.velocity);
     if (settings_.terms.gravity) force += off.load.x() * at(along_x_) + off.load.y() * at(along_y_);
   }
@@ -241,8 +270,10 @@ void CurvatureController::correct(const ModelCorrection& correction, ConstVector
   }
   if (settings_.disturbance == DisturbanceRejection::cancel)
     out.tau_u_nm -= correction.disturbance_nm;
+  const int width = arm_.segment_dof();
   for (int i = 0; i < arm_.size(); ++i)
-    out.tau_u_nm.segment<2>(2 * i) /= 1.0 + correction.segment[static_cast<std::size_t>(i)].gain;
+    out.tau_u_nm.segment<2>(width * i) /=
+        1.0 + correction.segment[static_cast<std::size_t>(i)].gain;
 }
 
 }  // namespace softarm

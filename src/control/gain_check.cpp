@@ -4,12 +4,12 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
 
 #include "control/sampled_loop.hpp"
+#include "softarm/model/coordinates.hpp"
 #include "softarm/model/dynamics.hpp"
 #include "softarm/model/kinematics.hpp"
 #include "softarm/model/statics.hpp"
@@ -44,23 +44,23 @@ struct Judged {
   }
 };
 
-/// Every other row and column, from `axis` on.
-Eigen::MatrixXd of_plane(const Eigen::MatrixXd& matrix, int axis) {
-  const Eigen::Index n = matrix.rows() / 2;
+/// Of every segment the row and column of one coordinate: u_x, u_y or e. In the straight pose they do
+/// not act on one another.
+Eigen::MatrixXd of_plane(const Eigen::MatrixXd& matrix, Eigen::Index width, int axis) {
+  const Eigen::Index n = matrix.rows() / width;
   Eigen::MatrixXd part(n, n);
   for (Eigen::Index i = 0; i < n; ++i)
-    for (Eigen::Index j = 0; j < n; ++j) part(i, j) = matrix(2 * i + axis, 2 * j + axis);
+    for (Eigen::Index j = 0; j < n; ++j) part(i, j) = matrix(width * i + axis, width * j + axis);
   return part;
 }
-Eigen::VectorXd of_plane(const Eigen::VectorXd& vector, int axis) {
-  return Eigen::Map<const Eigen::VectorXd, 0, Eigen::InnerStride<2>>(vector.data() + axis,
-                                                                     vector.size() / 2);
+Eigen::VectorXd of_plane(const Eigen::VectorXd& vector, Eigen::Index width, int axis) {
+  return Eigen::Map<const Eigen::VectorXd, 0, Eigen::InnerStride<>>(
+      vector.data() + axis, vector.size() / width, Eigen::InnerStride<>(width));
 }
 
-std::array<Judged, 2> judged_planes(const ArmParameters& arm, const Eigen::VectorXd& kp,
-                                    const Eigen::VectorXd& kd, bool gravity_fed_back) {
-  expect_constant_length(arm, "gain check");
-  const int n = arm.size(), dof = arm.dof();
+std::vector<Judged> judged_planes(const ArmParameters& arm, const Eigen::VectorXd& kp,
+                                  const Eigen::VectorXd& kd, bool gravity_fed_back) {
+  const int n = arm.size(), dof = arm.dof(), width = arm.segment_dof();
   if (kp.size() != dof || kd.size() != dof) {
     throw std::invalid_argument(
         fmt::format("gain check: expected {} gains, got {} and {}", dof, kp.size(), kd.size()));
@@ -71,29 +71,32 @@ std::array<Judged, 2> judged_planes(const ArmParameters& arm, const Eigen::Vecto
   const Eigen::VectorXd zero = Eigen::VectorXd::Zero(dof);
   dynamics_matrices(arm, workspace, zero, zero, B, C, G);
   const Eigen::MatrixXd slope = gravity_slope(arm, zero);
-  std::array<Judged, 2> planes;
-  for (int axis = 0; axis < 2; ++axis) {
+  std::vector<Judged> planes(static_cast<std::size_t>(width));
+  for (int axis = 0; axis < width; ++axis) {
     Judged& judged = planes[static_cast<std::size_t>(axis)];
-    judged.plane.inverse_inertia = of_plane(B, axis).llt().solve(Eigen::MatrixXd::Identity(n, n));
-    judged.plane.gravity_slope = of_plane(slope, axis);
+    judged.plane.inverse_inertia =
+        of_plane(B, width, axis).llt().solve(Eigen::MatrixXd::Identity(n, n));
+    judged.plane.gravity_slope = of_plane(slope, width, axis);
     judged.plane.stiffness.setZero(n, n);
     judged.plane.damping.setZero(n, n);
     for (int i = 0; i < n; ++i) {
       const SegmentParameters& segment = arm.segments[static_cast<std::size_t>(i)];
-      judged.plane.stiffness(i, i) = segment.stiffness_nm_per_rad;
-      judged.plane.damping(i, i) = segment.damping_nms_per_rad;
+      judged.plane.stiffness(i, i) =
+          axis == 2 ? segment.axial_stiffness_n_per_m : segment.stiffness_nm_per_rad;
+      judged.plane.damping(i, i) =
+          axis == 2 ? segment.axial_damping_ns_per_m : segment.damping_nms_per_rad;
     }
-    judged.plane.kp = of_plane(kp, axis).asDiagonal();
-    judged.plane.kd = of_plane(kd, axis).asDiagonal();
-    judged.largest_kp = of_plane(kp, axis).maxCoeff();
+    judged.plane.kp = of_plane(kp, width, axis).asDiagonal();
+    judged.plane.kd = of_plane(kd, width, axis).asDiagonal();
+    judged.largest_kp = of_plane(kp, width, axis).maxCoeff();
     if (n > kMostModes) judged.plane = reduced(judged.plane, kMostModes);
     judged.gravity_fed_back = gravity_fed_back;
   }
   return planes;
 }
 
-std::string explain(const LoopSampling& sampling, double kp, double factor,
-                    const std::string& what) {
+std::string explain(const LoopSampling& sampling, double kp, double factor, const std::string& what,
+                    const char* unit) {
   const std::string loop = fmt::format(
       "{:.4g} Hz of control, frames at {:.4g} Hz that are {:.4g} s late, a filter of {:.4g} rad/s, "
       "a "
@@ -102,11 +105,11 @@ std::string explain(const LoopSampling& sampling, double kp, double factor,
       sampling.filter_bandwidth_radps, sampling.dead_time_s, sampling.valve_lag_s);
   if (factor <= 0.0) return fmt::format("{}: with {} no gain is stable", what, loop);
   return fmt::format(
-      "{}: a stiffness of {:.3g} N m/rad is {} what {} leave stable, about {:.3g} N m/rad; lower "
+      "{}: a stiffness of {:.3g} {} is {} what {} leave stable, about {:.3g} {}; lower "
       "the "
       "gains or the delays, or try another filter",
-      what, kp, factor < 1.0 ? "beyond" : fmt::format("within a factor {} of", kMargin), loop,
-      factor * kp);
+      what, kp, unit, factor < 1.0 ? "beyond" : fmt::format("within a factor {} of", kMargin), loop,
+      factor * kp, unit);
 }
 
 }  // namespace
@@ -152,27 +155,32 @@ double largest_gain_factor(const ArmParameters& arm, const LoopSampling& samplin
 std::vector<std::string> gain_warnings(const ArmParameters& arm, const ControllerSettings& settings,
                                        const LoopSampling& sampling, double theta_rad) {
   const bool polar = settings.coordinates == ControlCoordinates::polar;
+  const auto all = [&](const std::vector<double>& bending, const std::vector<double>& axial) {
+    SegmentScalars along = SegmentScalars::Zero(arm.size());
+    std::copy(axial.begin(), axial.end(), along.begin());
+    return coordinates(arm, Eigen::Map<const Eigen::VectorXd>(bending.data(), std::ssize(bending)),
+                       along);
+  };
   const double theta = std::max(theta_rad, settings.polar_theta_min_rad);
-  Eigen::VectorXd kp = Eigen::Map<const Eigen::VectorXd>(
-      settings.kp.data(), static_cast<Eigen::Index>(settings.kp.size()));
-  Eigen::VectorXd kd = Eigen::Map<const Eigen::VectorXd>(
-      settings.kd.data(), static_cast<Eigen::Index>(settings.kd.size()));
+  Eigen::VectorXd kp = all(settings.kp, settings.kp_axial);
+  Eigen::VectorXd kd = all(settings.kd, settings.kd_axial);
   if (polar) {
     for (Eigen::Index i = 0; i < kp.size(); i += 2) kp[i] /= theta * theta;
     for (Eigen::Index i = 0; i < kd.size(); i += 2) kd[i] /= theta * theta;
   }
   const auto planes = judged_planes(arm, kp, kd, settings.terms.gravity);
   std::vector<std::string> warnings;
-  for (std::size_t axis = 0; axis < 2; ++axis) {
+  for (std::size_t axis = 0; axis < planes.size(); ++axis) {
     const Judged& judged = planes[axis];
     // Two simulations say that all is well; the search is for the message only.
     if (judged.stable(sampling, 1.0) && judged.stable(sampling, kMargin)) continue;
-    std::string what = axis == 0 ? "gains of u_x" : "gains of u_y";
+    std::string what = axis == 0 ? "gains of u_x" : axis == 1 ? "gains of u_y" : "gains of e";
     if (polar && axis == 0) {
       what = fmt::format("gains of phi (K_P / theta^2 at theta = {:.3g} rad)", theta);
     }
     if (polar && axis == 1) what = "gains of theta";
-    warnings.push_back(explain(sampling, judged.largest_kp, judged.largest_factor(sampling), what));
+    warnings.push_back(explain(sampling, judged.largest_kp, judged.largest_factor(sampling), what,
+                               axis == 2 ? "N/m" : "N m/rad"));
   }
   return warnings;
 }

@@ -17,9 +17,9 @@ namespace {
 
 constexpr double kShortestLive = 0.05;  ///< s, for a live reference that is corrected a little
 
-double largest_norm(const SegmentVector& v) noexcept {
+double largest_norm(const SegmentVector& v, Eigen::Index width) noexcept {
   double largest = 0.0;
-  for (Eigen::Index i = 0; i < v.size(); i += 2) {
+  for (Eigen::Index i = 0; i < v.size(); i += width) {
     largest = std::max(largest, std::hypot(v[i], v[i + 1]));
   }
   return largest;
@@ -67,6 +67,7 @@ struct Reference::State {
   };
   struct Phase {
     ReferenceKind kind;
+    ElongationPath elongation;
     bool live = false;
     double timeout_s = 0.0;  ///< of a live phase
     double begin_s = 0.0;
@@ -78,6 +79,8 @@ struct Reference::State {
 
   ArmParameters arm;
   int dof = 0;
+  Eigen::Index width = 2;    ///< coordinates of a segment
+  SegmentScalars natural_m;  ///< elongation where a phase asks for none
   ControllerSettings control;
   std::vector<Phase> phases;
   bool started = false;
@@ -91,6 +94,8 @@ struct Reference::State {
 
   const Phase& at(double time_s, int& index) const noexcept;
   void curve(const Phase& phase, double time_s, ReferenceSample& out) const noexcept;
+  void add_elongation(const Phase& phase, double time_s, ReferenceSample& out) const noexcept;
+  double norm(const SegmentVector& v) const noexcept { return largest_norm(v, width); }
   void unlimited(int index, double time_s, ReferenceSample& out) const noexcept;
   double blend_duration(const SegmentVector& d, double peak_speed_radps) const noexcept;
   void join(int index) noexcept;
@@ -111,9 +116,14 @@ const Reference::State::Phase& Reference::State::at(double time_s, int& index) c
 // The phase's own curve at a time since its beginning.
 void Reference::State::curve(const Phase& phase, double time_s,
                              ReferenceSample& out) const noexcept {
+  if (!phase.tracker && !phase.live) {
+    resize(out, 2 * arm.size());
+    phase.kind.evaluate(time_s, out);
+    if (arm.extensible) add_elongation(phase, time_s, out);
+    return;
+  }
   resize(out, dof);
   if (phase.tracker) return phase.tracker->sample(phase.begin_s + time_s, out);
-  if (!phase.live) return phase.kind.evaluate(time_s, out);
   const Message& message = phase.message;
   const double age = std::max(time_s - message.time_s, 0.0);
   out.u = message.u;
@@ -129,6 +139,28 @@ void Reference::State::curve(const Phase& phase, double time_s,
   }
 }
 
+// From [u_x, u_y] of every segment to [u_x, u_y, e].
+void Reference::State::add_elongation(const Phase& phase, double time_s,
+                                      ReferenceSample& out) const noexcept {
+  const auto spread = [this](SegmentVector& v) {
+    v.conservativeResize(dof);  // storage in place
+    for (Eigen::Index i = arm.size(); i-- > 0;) {
+      v[3 * i + 1] = v[2 * i + 1];
+      v[3 * i] = v[2 * i];
+      v[3 * i + 2] = 0.0;
+    }
+  };
+  for (SegmentVector* v : {&out.u, &out.velocity, &out.acceleration}) spread(*v);
+  for (Eigen::Index i = 0; i < arm.size(); ++i) {
+    if (arm.segments[static_cast<std::size_t>(i)].constant_length) continue;
+    const ElongationPath& path = phase.elongation;
+    const double rate = path.rate_radps, angle = rate * time_s;
+    out.u[3 * i + 2] = path.mean_m.value_or(natural_m[i]) + path.amplitude_m * std::sin(angle);
+    out.velocity[3 * i + 2] = path.amplitude_m * rate * std::cos(angle);
+    out.acceleration[3 * i + 2] = -path.amplitude_m * rate * rate * std::sin(angle);
+  }
+}
+
 void Reference::State::unlimited(int index, double time_s, ReferenceSample& out) const noexcept {
   const Phase& phase = phases[static_cast<std::size_t>(index)];
   const double local = time_s - phase.begin_s;
@@ -141,7 +173,7 @@ void Reference::State::unlimited(int index, double time_s, ReferenceSample& out)
 
 double Reference::State::blend_duration(const SegmentVector& d, double peak) const noexcept {
   const double speed = std::max(control.max_speed_radps - peak, 0.25 * control.max_speed_radps);
-  return std::max({control.blend_s, kQuinticPeakSpeed * largest_norm(d) / speed, 1e-3});
+  return std::max({control.blend_s, kQuinticPeakSpeed * norm(d) / speed, 1e-3});
 }
 
 // Joins phase `index` to `from` (u, velocity), what the reference is just before it.
@@ -157,6 +189,7 @@ void Reference::State::join(int index) noexcept {
   if (phase.live) {
     phase.message.received = false;
     phase.message.u = from.u;
+    for (Eigen::Index i = 0; i < natural_m.size(); ++i) phase.message.u[3 * i + 2] = natural_m[i];
     phase.message.time_s = 0.0;
   }
   phase.join.clear();
@@ -183,11 +216,10 @@ void Reference::State::join_message(Phase& phase, double time_s) noexcept {
   offset_rate = from.velocity - to.velocity;
   const double acceleration =
       control.max_step_rad / std::max(control.blend_s * control.blend_s, 1e-6);
-  double duration =
-      std::max({phase.join.remaining_s(time_s), kShortestLive,
-                std::sqrt(largest_norm(offset) / acceleration),
-                std::min(largest_norm(offset_rate) / acceleration, control.blend_s),
-                kQuinticPeakSpeed * largest_norm(offset) / (0.5 * control.max_speed_radps)});
+  double duration = std::max({phase.join.remaining_s(time_s), kShortestLive,
+                              std::sqrt(norm(offset) / acceleration),
+                              std::min(norm(offset_rate) / acceleration, control.blend_s),
+                              kQuinticPeakSpeed * norm(offset) / (0.5 * control.max_speed_radps)});
   from.u = offset;
   from.velocity = offset_rate;
   from.acceleration -= to.acceleration;
@@ -222,10 +254,19 @@ Reference::Reference(const ReferenceSettings& settings, const ControllerSettings
       }()) {}
 
 Reference::Reference(const ReferenceSettings& settings, const ControllerSettings& control,
-                     const ArmParameters& arm)
+                     const ArmParameters& arm, const SegmentScalars& natural_elongation_m)
     : state_(std::make_unique<State>()) {
-  expect_constant_length(arm, "reference");
   const int segments = arm.size();
+  if (arm.extensible && segments > kMaxStretchingSegments) {
+    throw std::invalid_argument(
+        fmt::format("reference: expected up to {} segments that stretch, got {}",
+                    kMaxStretchingSegments, segments));
+  }
+  state_->width = arm.segment_dof();
+  if (arm.extensible) {
+    state_->natural_m = natural_elongation_m;
+    if (natural_elongation_m.size() != segments) state_->natural_m.setZero(segments);
+  }
   if (segments < 1 || segments > kMaxSegments) {
     throw std::invalid_argument(
         fmt::format("reference: expected 1 to {} segments, got {}", kMaxSegments, segments));
@@ -241,7 +282,7 @@ Reference::Reference(const ReferenceSettings& settings, const ControllerSettings
         control.max_theta_rad, control.max_speed_radps, control.max_step_rad, control.blend_s));
   }
   state_->arm = arm;
-  state_->dof = 2 * segments;
+  state_->dof = arm.dof();
   state_->control = control;
   double begin = 0.0;
   for (std::size_t i = 0; i < settings.phases.size(); ++i) {
@@ -254,6 +295,7 @@ Reference::Reference(const ReferenceSettings& settings, const ControllerSettings
     }
     State::Phase made;
     made.kind = phase.kind;
+    made.elongation = phase.elongation;
     made.begin_s = begin;
     if (const auto* live = phase.kind.get_if<LiveReference>()) {
       made.live = true;
@@ -265,7 +307,7 @@ Reference::Reference(const ReferenceSettings& settings, const ControllerSettings
     made.message.velocity.setZero(state_->dof);
     made.message.acceleration.setZero(state_->dof);
     made.message.rest.resize(state_->dof);
-    if (phase.kind.is_tip_path()) made.tracker.emplace(arm, control, phase.kind);
+    if (phase.kind.is_tip_path()) made.tracker.emplace(arm, control, phase.kind, state_->natural_m);
     state_->phases.push_back(std::move(made));
     begin += phase.duration_s;
   }
@@ -327,11 +369,11 @@ void Reference::sample(double time_s, ReferenceSample& out) const noexcept {
   int index;
   s.at(time, index);
   s.unlimited(index, time, out);
-  if (bend_inside(s.control.max_theta_rad, out)) {
+  if (bend_inside(s.control.max_theta_rad, s.width, out)) {
     out.limited = true;
     out.has_polar = false;
   }
-  if (largest_norm(out.velocity) > s.control.max_speed_radps * (1.0 + 1e-9)) out.limited = true;
+  if (s.norm(out.velocity) > s.control.max_speed_radps * (1.0 + 1e-9)) out.limited = true;
 }
 
 void Reference::window(double time_s, double lookahead_s, ReferenceWindow& out) const noexcept {
@@ -359,26 +401,28 @@ LiveVerdict Reference::receive(double time_s, ConstVectorRef u, ConstVectorRef v
   s.at(time, index);
   State::Phase& phase = s.phases[static_cast<std::size_t>(index)];
   if (!s.started || time < 0.0 || !phase.live) return LiveVerdict::not_live;
-  if (u.size() != s.dof || velocity.size() != s.dof || acceleration.size() != s.dof) {
+  const Eigen::Index bends = 2 * s.arm.size();
+  if (u.size() != bends || velocity.size() != bends || acceleration.size() != bends) {
     return LiveVerdict::wrong_size;
   }
   if (!u.allFinite() || !velocity.allFinite() || !acceleration.allFinite()) {
     return LiveVerdict::not_finite;
   }
-  resize(s.to, s.dof);
+  resize(s.to, static_cast<int>(bends));
   s.to.u = u;
   s.to.velocity = velocity;
   s.to.acceleration = acceleration;
-  s.offset_rate = velocity + phase.timeout_s * acceleration;
+  if (s.arm.extensible) s.add_elongation(phase, time - phase.begin_s, s.to);
+  s.offset_rate = s.to.velocity + phase.timeout_s * s.to.acceleration;
   const double max_speed = s.control.max_speed_radps;
-  if (largest_norm(s.to.u) > s.control.max_theta_rad || largest_norm(s.to.velocity) > max_speed ||
-      largest_norm(s.offset_rate) > max_speed) {
+  if (s.norm(s.to.u) > s.control.max_theta_rad || s.norm(s.to.velocity) > max_speed ||
+      s.norm(s.offset_rate) > max_speed) {
     return LiveVerdict::out_of_limits;
   }
   const double local = time - phase.begin_s;
   s.curve(phase, local, s.from);
   s.offset = s.from.u - s.to.u;
-  if (largest_norm(s.offset) > s.control.max_step_rad) return LiveVerdict::step_too_large;
+  if (s.norm(s.offset) > s.control.max_step_rad) return LiveVerdict::step_too_large;
   s.join_message(phase, local);
   s.join_following(index);
   return LiveVerdict::accepted;

@@ -11,10 +11,11 @@ inline constexpr double kKnee = 0.98;  ///< of max_theta_rad: from here on theta
 
 /// Bends u inside of theta < limit: theta -> knee + w tanh((theta - knee) / w), w = limit - knee;
 /// C2, exact chain rule.
-inline bool bend_inside(double limit, ReferenceSample& sample) noexcept {
+/// @param width coordinates of a segment: 2, or 3 where segments stretch
+inline bool bend_inside(double limit, Eigen::Index width, ReferenceSample& sample) noexcept {
   const double knee = kKnee * limit, w = limit - knee;
   bool bent = false;
-  for (Eigen::Index i = 0; i < sample.u.size(); i += 2) {
+  for (Eigen::Index i = 0; i < sample.u.size(); i += width) {
     auto u = sample.u.segment<2>(i), ud = sample.velocity.segment<2>(i),
          udd = sample.acceleration.segment<2>(i);
     const double r = u.norm();

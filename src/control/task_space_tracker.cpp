@@ -11,7 +11,9 @@
 namespace softarm {
 namespace {
 
-constexpr double kHard = 0.05;          ///< of the arm's length a rad: J is damped below
+constexpr double kHard = 0.05;  ///< of the arm's length a rad: J is damped below
+constexpr double kHardStretch =
+    0.7;  ///< likewise at most, of what one segment's e moves the tip by
 constexpr double kLargestError = 0.25;  ///< of the arm's length
 constexpr double kThetaBound = 0.97;    ///< of max_theta_rad
 constexpr double kLongestStep_s = 0.005;
@@ -40,7 +42,8 @@ double length(const ArmParameters& arm) {
 }  // namespace
 
 TaskSpaceTracker::TaskSpaceTracker(const ArmParameters& arm, const ControllerSettings& control,
-                                   const ReferenceKind& path)
+                                   const ReferenceKind& path,
+                                   const SegmentScalars& natural_elongation_m)
     : arm_(arm),
       gains_(control.task_space),
       path_(path),
@@ -48,17 +51,36 @@ TaskSpaceTracker::TaskSpaceTracker(const ArmParameters& arm, const ControllerSet
       max_theta_rad_(kThetaBound * control.max_theta_rad),
       max_speed_radps_(control.max_speed_radps),
       reach_m_(length(arm)),
-      offset_(gains_.tip_bandwidth_radps, gains_.map_rate_1ps, reach_m_) {
+      offset_(gains_.tip_bandwidth_radps, gains_.map_rate_1ps, reach_m_),
+      hard_mprad_(kHard * reach_m_) {
   require_positive("lambda_1ps", gains_.lambda_1ps);
   require_positive("tip_bandwidth_radps", gains_.tip_bandwidth_radps);
   require_not_negative("posture_rate_1ps", gains_.posture_rate_1ps);
   require_not_negative("map_rate_1ps", gains_.map_rate_1ps);
   for (SegmentVector* v : {&u_, &velocity_, &acceleration_, &jerk_, &posture_})
     v->setZero(arm_.dof());
+  if (arm_.extensible) weigh(natural_elongation_m);
   jacobian_.setZero(3, arm_.dof());
   jacobian_rate_.setZero(3, arm_.dof());
   join_.resize(3);
   for (SegmentVector* v : {&blended_.u, &blended_.velocity, &blended_.acceleration}) v->setZero(3);
+}
+
+void TaskSpaceTracker::weigh(const SegmentScalars& natural_elongation_m) {
+  rest_.setZero(arm_.dof());
+  scale_.setZero(arm_.dof());
+  double mean = 0.0, softest_m = reach_m_;
+  for (const SegmentParameters& segment : arm_.segments)
+    mean += segment.stiffness_nm_per_rad / arm_.size();
+  for (int i = 0; i < arm_.size(); ++i) {
+    const SegmentParameters& segment = arm_.segments[static_cast<std::size_t>(i)];
+    scale_.segment<2>(3 * i).setConstant(std::sqrt(mean / segment.stiffness_nm_per_rad));
+    if (segment.constant_length) continue;
+    scale_[3 * i + 2] = std::sqrt(mean / segment.axial_stiffness_n_per_m);
+    softest_m = std::min(softest_m, scale_[3 * i + 2]);
+    rest_[3 * i + 2] = natural_elongation_m[i];
+  }
+  hard_mprad_ = std::min(hard_mprad_, kHardStretch * softest_m);
 }
 
 void TaskSpaceTracker::start(double time_s, ConstVectorRef u, ConstVectorRef velocity,
@@ -132,8 +154,18 @@ void TaskSpaceTracker::accelerate() noexcept {
                               2.0 * lambda * (wanted.velocity_mps - velocity) +
                               lambda * lambda * error - jacobian_rate_ * velocity_;
   // J^+ tip + (I - J^+ J) posture, in one go.
+  if (arm_.extensible) {
+    posture_ = -2.0 * lambda * (velocity_ + gains_.posture_rate_1ps * (u_ - rest_));
+    const Eigen::Vector3d rest = tip - jacobian_ * posture_;
+    for (Eigen::Index j = 0; j < scale_.size(); ++j) jacobian_.col(j) *= scale_[j];
+    const Eigen::Vector3d force = damped_inverse(jacobian_, hard_mprad_) * rest;
+    acceleration_.noalias() = jacobian_.transpose() * force;
+    acceleration_.array() *= scale_.array();
+    acceleration_ += posture_;
+    return;
+  }
   posture_ = -2.0 * lambda * (velocity_ + gains_.posture_rate_1ps * u_);
-  const Eigen::Matrix3d inverse = damped_inverse(jacobian_, kHard * reach_m_);
+  const Eigen::Matrix3d inverse = damped_inverse(jacobian_, hard_mprad_);
   const Eigen::Vector3d force = inverse * (tip - jacobian_ * posture_);
   acceleration_.noalias() = jacobian_.transpose() * force;
   acceleration_ += posture_;
@@ -142,7 +174,7 @@ void TaskSpaceTracker::accelerate() noexcept {
 // Changes u'' so that after `duration_s` neither |u'| nor, at the rate 2 lambda at which it may be
 // approached, theta is beyond its bound.
 void TaskSpaceTracker::bound(double duration_s) noexcept {
-  for (Eigen::Index i = 0; i < u_.size(); i += 2) {
+  for (Eigen::Index i = 0; i < u_.size(); i += arm_.segment_dof()) {
     const Eigen::Vector2d u = u_.segment<2>(i), now = velocity_.segment<2>(i);
     const Eigen::Vector2d asked = now + duration_s * acceleration_.segment<2>(i);
     Eigen::Vector2d allowed = asked;

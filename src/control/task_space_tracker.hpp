@@ -24,13 +24,18 @@ namespace softarm {
 /// Null space: u'' = -2 L (u' + r u), r the posture rate: the posture drifts to less bend at rate r
 /// and nothing circulates. The same damps directions in which J is nearly singular.
 ///
+/// Where segments stretch, the same in (u, e) with J^# = W J'(J W J')^-1 in place of J^+: W, the inverse
+/// of the stiffnesses, makes it the least elastic rate, and rad and m comparable. e drifts to its
+/// natural value. W = I otherwise, and with equal bending stiffness in u.
+///
 /// Bounds: the tip error that is acted on is at most a quarter of the arm's length; |u'| of a
 /// segment stays within max_speed_radps and theta within 0.97 max_theta_rad. For a path out of
 /// reach the arm thus comes to rest stretched out towards it. All times in s, one clock.
 class TaskSpaceTracker {
  public:
+  /// @param natural_elongation_m n, of segments that stretch; otherwise not read
   TaskSpaceTracker(const ArmParameters& arm, const ControllerSettings& control,
-                   const ReferenceKind& path);
+                   const ReferenceKind& path, const SegmentScalars& natural_elongation_m);
 
   /// From u, velocity (2n) at `time_s`, where the path begins. The path is joined from where the
   /// tip is by a quintic in blend_s. @param tip_offset_m d there.
@@ -54,6 +59,7 @@ class TaskSpaceTracker {
   static constexpr int kMaxSteps = 20;
 
  private:
+  void weigh(const SegmentScalars& natural_elongation_m);
   void accelerate() noexcept;
   void step(double duration_s) noexcept;
   void bound(double duration_s) noexcept;
@@ -75,6 +81,9 @@ class TaskSpaceTracker {
   TipOffset offset_;
   Eigen::Matrix3Xd jacobian_, jacobian_rate_;
   SegmentVector posture_;
+  SegmentVector rest_;   ///< of the posture, where segments stretch; otherwise empty
+  SegmentVector scale_;  ///< sqrt W, likewise
+  double hard_mprad_;    ///< J is damped below
   ReferenceSample blended_;
 };
 

@@ -49,14 +49,17 @@ void SummaryFiles::write(const std::string& summary, const std::string& timing) 
 ExperimentLog::ExperimentLog(const std::filesystem::path& folder, const Experiment& experiment,
                              const Files& inputs)
     : file_(made(folder) / "log.csv", inputs_of(experiment, inputs), OutputFile::Kind::record),
-      segments_(experiment.arm.size()) {
+      segments_(experiment.arm.size()),
+      stretches_(experiment.arm.extensible) {
   std::string header = provenance_line(experiment) + "\nt_s,mode,reason,saturated,frame_age_s";
-  for (int i = 1; i <= segments_; ++i)
+  for (int i = 1; i <= segments_; ++i) {
     header += fmt::format(
         ",u{0}_x_rad,u{0}_y_rad,v{0}_x_radps,v{0}_y_radps,ref{0}_x_rad,ref{0}_y_rad,true{0}_x_rad,"
         "true{0}_y_rad,"
         "tau{0}_x_nm,tau{0}_y_nm,twist{0}_rad,length{0}_m",
         i);
+    if (stretches_) header += fmt::format(",e{0}_m,eref{0}_m,etrue{0}_m,axial{0}_n", i);
+  }
   chambers_ = 0;
   for (std::size_t i = 0; i < experiment.actuation.segments.size(); ++i)
     for (std::size_t j = 0; j < experiment.actuation.segments[i].size(); ++j, ++chambers_)
@@ -92,6 +95,10 @@ void ExperimentLog::add(const LogRow& row) {
       pair(*v, i);
     single(row.residual_torsion, i);
     single(row.residual_length, i);
+    if (!stretches_) continue;
+    for (const SegmentScalars* v :
+         {&row.elongation, &row.elongation_reference, &row.elongation_truth, &row.axial_force})
+      cells(v->data() + i, v->size() > i ? 1 : 0, 1);
   }
   for (int j = 0; j < chambers_; ++j) {
     cells(row.commanded.data() + j, row.commanded.size() > j ? 1 : 0, 1);

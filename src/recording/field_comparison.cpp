@@ -136,12 +136,14 @@ std::vector<FieldDifference> differences(const controller_status_t& recorded,
                                          const controller_status_t& replayed) {
   const auto& [time_a, tick_a, frame_a, hash_a, seed_a, nonce_a, version_a, mode_a, reason_a,
                flags_a, age_a, accepted_a, rejected_a, refusal_a, repeated_a, missing_a, overruns_a,
-               malformed_a, segments_a, chambers_a, u_a, velocity_a, reference_a, phi_a, theta_a,
-               tau_a, twist_a, length_a, pressure_a] = recorded;
+               malformed_a, segments_a, chambers_a, stretching_a, u_a, velocity_a, reference_a,
+               phi_a, theta_a, tau_a, twist_a, length_a, pressure_a, elongation_a,
+               elongation_rate_a, elongation_ref_a, axial_a] = recorded;
   const auto& [time_b, tick_b, frame_b, hash_b, seed_b, nonce_b, version_b, mode_b, reason_b,
                flags_b, age_b, accepted_b, rejected_b, refusal_b, repeated_b, missing_b, overruns_b,
-               malformed_b, segments_b, chambers_b, u_b, velocity_b, reference_b, phi_b, theta_b,
-               tau_b, twist_b, length_b, pressure_b] = replayed;
+               malformed_b, segments_b, chambers_b, stretching_b, u_b, velocity_b, reference_b,
+               phi_b, theta_b, tau_b, twist_b, length_b, pressure_b, elongation_b,
+               elongation_rate_b, elongation_ref_b, axial_b] = replayed;
   Collector compare;
   compare("time_us", "us", time_a, time_b);
   compare("tick", "", tick_a, tick_b);
@@ -156,6 +158,7 @@ std::vector<FieldDifference> differences(const controller_status_t& recorded,
   compare("frames_missing", "", missing_a, missing_b);
   compare("num_segments", "", segments_a, segments_b);
   compare("num_chambers", "", chambers_a, chambers_b);
+  compare("num_stretching", "", stretching_a, stretching_b);
   compare("u_rad", "rad", u_a, u_b);
   compare("velocity_radps", "rad/s", velocity_a, velocity_b);
   compare("reference_u_rad", "rad", reference_a, reference_b);
@@ -165,6 +168,10 @@ std::vector<FieldDifference> differences(const controller_status_t& recorded,
   compare("residual_twist_rad", "rad", twist_a, twist_b);
   compare("residual_length_m", "m", length_a, length_b);
   compare("pressure_bar", "bar", pressure_a, pressure_b);
+  compare("elongation_m", "m", elongation_a, elongation_b);
+  compare("elongation_rate_mps", "m/s", elongation_rate_a, elongation_rate_b);
+  compare("reference_elongation_m", "m", elongation_ref_a, elongation_ref_b);
+  compare("axial_force_n", "N", axial_a, axial_b);
   // Not compared: hash_, seed_, nonce_, version_, overruns_ and malformed_ belong to the daemon, not the
   // tick.
   static_cast<void>(hash_a == hash_b && seed_a == seed_b && nonce_a == nonce_b &&

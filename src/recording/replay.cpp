@@ -79,7 +79,7 @@ void Replay::take_record(const LogEvent& event) {
 bool Replay::fits(const tick_record_t& record) const {
   constexpr std::int64_t kMost = 4'000'000'000'000'000'000;
   const auto sane = [](std::int64_t number) { return number >= 0 && number < kMost; };
-  const int dof = experiment_.arm.dof();
+  const int dof = 2 * experiment_.arm.size();
   const auto frame_fits = [&](const softarm_messages::tick_frame_t& frame) {
     return frame.num_bodies == experiment_.arm.size() + 1 && frame.capture_ns > -kMost &&
            frame.capture_ns < kMost;

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "softarm/base/time.hpp"
+#include "softarm/model/coordinates.hpp"
 #include "softarm/model/kinematics.hpp"
 #include "softarm/transport/message_decoding.hpp"
 #include "softarm/transport/settings.hpp"
@@ -34,6 +35,11 @@ void TruthTrack::fill(std::int64_t time_us, LogRow& row) const {
   row.truth = (1 + 2 * s) * (1 - s) * (1 - s) * before_->u_rad +
               h * s * (1 - s) * (1 - s) * before_->velocity_radps +
               s * s * (3 - 2 * s) * after_->u_rad + h * s * s * (s - 1) * after_->velocity_radps;
+  if (before_->elongation_m.size() == after_->elongation_m.size())
+    row.elongation_truth = (1 + 2 * s) * (1 - s) * (1 - s) * before_->elongation_m +
+                           h * s * (1 - s) * (1 - s) * before_->elongation_rate_mps +
+                           s * s * (3 - 2 * s) * after_->elongation_m +
+                           h * s * s * (s - 1) * after_->elongation_rate_mps;
   row.real = after_->pressure_bar;
   row.tip = (1 - s) * before_->tip_m + s * after_->tip_m;
 }
@@ -97,10 +103,14 @@ bool StatusRecord::take_status(std::span<const std::byte> bytes) {
   row.residual_torsion = status_.torsion_rad;
   row.residual_length = status_.length_error_m;
   row.commanded = status_.pressure_bar;
+  row.elongation = status_.elongation_m;
   if (row.mode == Mode::active) {
     row.reference = status_.reference_u_rad;
     row.tau_actuation = status_.tau_actuation_nm;
-    row.tip_reference = tip_position(experiment_.arm, row.reference);
+    row.elongation_reference = status_.reference_elongation_m;
+    row.axial_force = status_.axial_force_n;
+    row.tip_reference = tip_position(
+        experiment_.arm, coordinates(experiment_.arm, row.reference, row.elongation_reference));
     active_s_ += period_s;
   }
   waiting_.push_back({time_us, std::move(row)});

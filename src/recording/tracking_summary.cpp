@@ -27,7 +27,8 @@ TrackingSummary::TrackingSummary(int segments, double tracking_from_s)
       tracking_from_s_(tracking_from_s),
       u_of_segment_(static_cast<std::size_t>(segments)),
       theta_(static_cast<std::size_t>(segments)),
-      phi_(static_cast<std::size_t>(segments)) {}
+      phi_(static_cast<std::size_t>(segments)),
+      elongation_(static_cast<std::size_t>(segments)) {}
 
 void TrackingSummary::add(const LogRow& row, double period_s) {
   if (ticks_++ == 0) first_t_s_ = row.t_s;
@@ -47,7 +48,19 @@ void TrackingSummary::add(const LogRow& row, double period_s) {
   if (row.saturated) ++saturated_ticks_;
   if (std::isnan(active_since_s_)) active_since_s_ = row.t_s;
   add_tip(row);
-  if (row.t_s - active_since_s_ >= tracking_from_s_) add_tracking(row);
+  if (row.t_s - active_since_s_ < tracking_from_s_) return;
+  add_tracking(row);
+  add_elongation(row);
+}
+
+void TrackingSummary::add_elongation(const LogRow& row) {
+  const Eigen::Index n = segments_;
+  if (row.elongation_truth.size() != n || row.elongation_reference.size() != n) return;
+  for (int i = 0; i < segments_; ++i) {
+    const double error_m = row.elongation_reference[i] - row.elongation_truth[i];
+    elongation_[static_cast<std::size_t>(i)].add(error_m);
+    elongation_max_m_ = std::max(elongation_max_m_, std::abs(error_m));
+  }
 }
 
 void TrackingSummary::add_tip(const LogRow& row) {
@@ -123,6 +136,10 @@ struct TrackingSummary::Json {
                {"phi_rms_rad", rms_of(of.phi_)},
                {"tip_rms_m", of.tip_.since(-std::numeric_limits<double>::infinity()).rms()},
                {"tip_rms_second_half_m", of.tip_.since(half_s).rms()}};
+    if (of.elongation_.front().count > 0) {
+      json["elongation_rms_segment_m"] = rms_of(of.elongation_);
+      json["elongation_max_m"] = of.elongation_max_m_;
+    }
     if (of.tip_is_asked_) {
       json["tip_max_m"] = of.tip_max_m_;
       json["tip_near_after_s"] = of.tip_last_far_s_ < of.tip_last_s_
@@ -205,6 +222,12 @@ std::string TrackingSummary::table() const {
                         1e3 * u_max_rad_);
   } else {
     text = "no tracking error: the true state is not known, or ACTIVE was too short\n";
+  }
+  if (elongation_.front().count > 0) {
+    MeanSquare all;
+    for (const MeanSquare& each : elongation_) all.add(each);
+    text += fmt::format("elongation error {:.3f} mm rms, {:.3f} mm at most\n", 1e3 * all.rms(),
+                        1e3 * elongation_max_m_);
   }
   if (tip_is_asked_) text += tip_line();
   if (frames_)

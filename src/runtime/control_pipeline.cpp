@@ -5,6 +5,7 @@
 
 #include "softarm/base/time.hpp"
 #include "softarm/estimation/model_observer.hpp"
+#include "softarm/runtime/elongation_reference.hpp"
 #include "softarm/runtime/settings.hpp"
 
 namespace softarm {
@@ -25,6 +26,12 @@ std::unique_ptr<ModelObserver> make_observer(const PipelineSettings& settings) {
                      .dead_time_s = settings.control.dead_time_s});
 }
 
+/// Of segments that stretch, at this pressure in all chambers; empty where they do not.
+SegmentScalars elongation(const PipelineSettings& settings, double pressure_bar) {
+  if (!settings.arm.extensible) return {};
+  return straight_elongation(settings.arm, settings.actuation, pressure_bar);
+}
+
 }  // namespace
 
 ControlPipeline::ControlPipeline(const PipelineSettings& settings)
@@ -33,23 +40,28 @@ ControlPipeline::ControlPipeline(const PipelineSettings& settings)
       period_s_(1.0 / settings.rate_hz),
       validator_(settings.estimation, settings.arm,
                  body_noise(settings.estimation, settings.arm.size())),
-      filter_(settings.estimation, settings.arm.size()),
+      filter_(settings.estimation, settings.arm),
       observer_(make_observer(settings)),
       newest_frames_(observer_ ? NewestFrames::most(settings.arm.size(), period_s_) : 0),
       delay_ns_(observer_ ? to_ns(settings.control.dead_time_s) : 0),
       safety_(settings.safety, period_s_),
       activation_limit_(settings.safety),
       answer_ns_(safety_.thresholds().hold_after_ns + to_ns(settings.control.dead_time_s)),
-      reference_(settings.reference, settings.control, settings.arm),
+      reference_(settings.reference, settings.control, settings.arm,
+                 elongation(settings, settings.actuation.bias_pressure_bar)),
       controller_(settings.arm, settings.control),
-      allocator_(settings.actuation),
+      allocator_(settings.actuation, settings.arm.extensible),
+      elongation_(settings.arm.extensible ? std::make_unique<ElongationReference>(
+                                                settings.arm, settings.actuation, allocator_)
+                                          : nullptr),
       ramps_(settings.actuation),
       pressure_watch_(settings.safety, allocator_.chambers()),
       command_moves_(settings.actuation),
       frame_period_watch_(settings.safety),
       curvature_watch_(settings.safety, settings.arm),
       oscillation_watch_(settings.safety, period_s_, settings.arm.dof()),
-      length_watch_(settings.safety, settings.arm),
+      length_watch_(settings.safety, settings.arm,
+                    elongation(settings, settings.actuation.max_pressure_bar)),
       previous_bar_(PressureVector::Zero(allocator_.chambers())),
       previous_tau_nm_(SegmentVector::Zero(settings.arm.dof())),
       commanded_tau_nm_(previous_tau_nm_),
@@ -83,6 +95,7 @@ const TickOutput& ControlPipeline::tick(const TickInput& input) noexcept {
     // be noise.
     const SegmentVector at_rest = SegmentVector::Zero(settings_.arm.dof());
     reference_.start(seconds(act_ns), output_.motion.u_rad, at_rest);
+    if (elongation_) elongation_->start(seconds(act_ns), output_.motion.u_rad);
     controller_.reset_integral();
     ++activations_;
   }
@@ -224,7 +237,6 @@ void ControlPipeline::use_frame(bool too_many) noexcept {
     unanswered_since_ns_ = kForever;
   }
   newest_capture_ns_ = frame.capture_ns;
-  length_watch_.judge(frame.capture_ns, estimate);
   output_.frame_number = frame.frame_number;
   const BodyPose& tip = frame.body[static_cast<std::size_t>(settings_.arm.size())];
   if (tip.valid) reference_.measure_tip(seconds(frame.capture_ns), tip.position_m);
@@ -235,6 +247,8 @@ void ControlPipeline::use_frame(bool too_many) noexcept {
   if (expects) expect(frame.capture_ns);
   const KnownMotion* const expected = expects ? &known_ : nullptr;
   filter_.update(frame.capture_ns, estimate, expected);
+  length_watch_.judge(frame.capture_ns, estimate,
+                      expects && elongation_ ? &known_.u_rad : nullptr);
   if (!observer_) return;
   if (too_many) {
     newest_frames_.keep(frame, estimate, expected);
@@ -264,6 +278,7 @@ void ControlPipeline::predict(std::int64_t now_ns, std::int64_t at_ns) noexcept 
 
 void ControlPipeline::expect(std::int64_t at_ns) noexcept {
   reference_.sample(seconds(at_ns), window_.now);
+  if (elongation_) elongation_->replace(seconds(at_ns), window_.now);
   known_ = {window_.now.u, window_.now.velocity, window_.now.acceleration, activations_};
 }
 
@@ -278,9 +293,13 @@ void ControlPipeline::take_reference(const TickInput& input) noexcept {
 
 void ControlPipeline::control(std::int64_t act_ns) noexcept {
   const std::int64_t ahead_ns = output_.observer != nullptr ? delay_ns_ : 0;
-  reference_.window(seconds(act_ns + ahead_ns), controller_.lookahead_s(), window_);
+  double lookahead_s = controller_.lookahead_s();
+  if (elongation_) lookahead_s = std::max(lookahead_s, ElongationReference::kLookahead_s);
+  reference_.window(seconds(act_ns + ahead_ns), lookahead_s, window_);
+  if (elongation_) elongation_->advance(seconds(act_ns + ahead_ns), lookahead_s, window_);
   controller_.compute(output_.motion.u_rad, output_.motion.velocity_radps, window_, control_,
                       output_.observer != nullptr ? &output_.observer->correction() : nullptr);
+  if (elongation_) elongation_->hold_constant_lengths(control_.tau_actuation_nm);
   allocator_.allocate(control_.tau_actuation_nm, allocation_);
   controller_.integrate(period_s_, output_.motion.u_rad, window_.now, allocation_.scale);
   if (ahead_ns > 0) reference_.sample(seconds(act_ns), window_.now);
@@ -323,10 +342,11 @@ bool ControlPipeline::poses_frozen(std::int64_t now_ns) const noexcept {
 
 bool ControlPipeline::beyond_soft_limit(bool speed_too) const noexcept {
   const FilteredMotion& motion = output_.motion;
+  const int width = settings_.arm.segment_dof();
   for (int i = 0; i < motion.segments; ++i) {
-    if (motion.u_rad.segment<2>(2 * i).norm() >
+    if (motion.u_rad.segment<2>(width * i).norm() >
             kSoftLimitMargin * settings_.control.max_theta_rad ||
-        (speed_too && motion.velocity_radps.segment<2>(2 * i).norm() >
+        (speed_too && motion.velocity_radps.segment<2>(width * i).norm() >
                           kSoftLimitMargin * settings_.control.max_speed_radps))
       return true;
   }

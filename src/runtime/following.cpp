@@ -149,7 +149,7 @@ double CurvatureWatch::largest_residual_nm(ConstVectorRef u_rad,
   static_moments(arm_, workspace_, u_rad, force_);
   apply_actuation(arm_, u_rad, tau_actuation_nm, actuated_);
   double largest = 0.0;
-  for (Eigen::Index i = 0; i < force_.size(); i += 2)
+  for (Eigen::Index i = 0; i < force_.size(); i += arm_.segment_dof())
     largest = std::max(largest, (force_.segment<2>(i) - actuated_.segment<2>(i)).norm());
   return largest;
 }
@@ -217,11 +217,14 @@ double OscillationWatch::HighPass::pass(double value, double share) noexcept {
   return fast - slower_;
 }
 
-LengthWatch::LengthWatch(const SafetySettings& settings, const ArmParameters& arm)
+LengthWatch::LengthWatch(const SafetySettings& settings, const ArmParameters& arm,
+                         const SegmentScalars& most_elongation_m)
     : settling_ns_(to_ns(settings.length_settling_s)),
       warning_{.relative = settings.length_warning},
       fault_{.relative = settings.length_fault} {
   for (const SegmentParameters& segment : arm.segments) length_m_.push_back(segment.length_m);
+  reach_m_.assign(most_elongation_m.begin(), most_elongation_m.end());
+  reach_m_.resize(length_m_.size());
   reset();
 }
 
@@ -232,13 +235,14 @@ void LengthWatch::reset() noexcept {
   }
 }
 
-void LengthWatch::judge(std::int64_t capture_ns, const CurvatureEstimate& estimate) noexcept {
-  judge(capture_ns, estimate, warning_);
-  judge(capture_ns, estimate, fault_);
+void LengthWatch::judge(std::int64_t capture_ns, const CurvatureEstimate& estimate,
+                        const SegmentVector* expected) noexcept {
+  judge(capture_ns, estimate, expected, warning_);
+  judge(capture_ns, estimate, expected, fault_);
 }
 
 void LengthWatch::judge(std::int64_t capture_ns, const CurvatureEstimate& estimate,
-                        Limit& limit) noexcept {
+                        const SegmentVector* expected, Limit& limit) noexcept {
   if (limit.relative <= 0.0) return;
   limit.exceeded = limit.beyond = false;
   for (std::size_t i = 0; i < length_m_.size(); ++i) {
@@ -247,7 +251,11 @@ void LengthWatch::judge(std::int64_t capture_ns, const CurvatureEstimate& estima
         estimate.valid[i] && 3.0 * std::sqrt(estimate.length_variance_m2[i]) <= allowed_m;
     std::int64_t& since_ns = limit.since_ns[i];
     if (evident) {
-      const bool off = std::abs(estimate.length_m[i] - length_m_[i]) > allowed_m;
+      const auto e = static_cast<Eigen::Index>(3 * i + 2);
+      const double least_m = expected != nullptr ? (*expected)[e] : 0.0;
+      const double most_m = expected != nullptr ? least_m : reach_m_[i];
+      const double elongation_m = estimate.length_m[i] - length_m_[i];
+      const bool off = elongation_m < least_m - allowed_m || elongation_m > most_m + allowed_m;
       since_ns = !off ? kNever : since_ns == kNever ? capture_ns : since_ns;
     }
     limit.beyond |= since_ns != kNever;

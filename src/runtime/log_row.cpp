@@ -1,5 +1,6 @@
 #include "softarm/runtime/log_row.hpp"
 
+#include "softarm/model/coordinates.hpp"
 #include "softarm/model/kinematics.hpp"
 
 namespace softarm {
@@ -11,10 +12,13 @@ void fill_from_pipeline(const ControlPipeline& pipeline, const ArmParameters& ar
   row.reason = output.reason;
   row.saturated = output.saturated;
   row.frame_age_s = output.frame_age_s;
-  row.u = output.motion.u_rad;
-  row.velocity = output.motion.velocity_radps;
-  row.reference = output.reference.u;
-  row.tau_actuation = output.tau_actuation_nm;
+  row.u = bend_part(arm, output.motion.u_rad);
+  row.velocity = bend_part(arm, output.motion.velocity_radps);
+  row.reference = bend_part(arm, output.reference.u);
+  row.tau_actuation = bend_part(arm, output.tau_actuation_nm);
+  row.elongation = stretch_part(arm, output.motion.u_rad);
+  row.elongation_reference = stretch_part(arm, output.reference.u);
+  row.axial_force = stretch_part(arm, output.tau_actuation_nm);
   row.residual_torsion = Eigen::Map<const Eigen::VectorXd>(estimate.twist_rad.data(), arm.size());
   row.residual_length =
       Eigen::Map<const Eigen::VectorXd>(estimate.length_error_m.data(), arm.size());
@@ -24,7 +28,7 @@ void fill_from_pipeline(const ControlPipeline& pipeline, const ArmParameters& ar
   if (row.tip_is_asked) {
     row.tip_reference = output.reference.tip.position_m;
   } else if (row.reference.size() > 0) {
-    row.tip_reference = tip_position(arm, row.reference);
+    row.tip_reference = tip_position(arm, output.reference.u);
   }
 }
 

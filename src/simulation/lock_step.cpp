@@ -45,6 +45,7 @@ void LockStep::fill(LogRow& row) const {
   row.real = arm_.measured_pressures_bar();
   row.tip = arm_.plant().tip_m();
   row.coordinates = arm_.plant().coordinates();
+  row.elongation_truth = arm_.plant().elongation_m();
 }
 
 }  // namespace softarm

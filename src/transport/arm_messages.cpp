@@ -70,6 +70,10 @@ bool decode(std::span<const std::byte> bytes, ArmStatus& out) {
   copy(message.residual_twist_rad, out.torsion_rad);
   copy(message.residual_length_m, out.length_error_m);
   copy(message.pressure_bar, out.pressure_bar);
+  copy(message.elongation_m, out.elongation_m);
+  copy(message.elongation_rate_mps, out.elongation_rate_mps);
+  copy(message.reference_elongation_m, out.reference_elongation_m);
+  copy(message.axial_force_n, out.axial_force_n);
   return true;
 }
 
@@ -82,6 +86,8 @@ bool decode(std::span<const std::byte> bytes, PlantState& out) {
   flatten(message.velocity_radps, out.velocity_radps);
   copy(message.pressure_bar, out.pressure_bar);
   out.tip_m = Eigen::Map<const Eigen::Vector3d>(message.tip_m);
+  copy(message.elongation_m, out.elongation_m);
+  copy(message.elongation_rate_mps, out.elongation_rate_mps);
   return true;
 }
 

@@ -36,7 +36,7 @@ DaemonLink::DaemonLink(const PipelineSettings& settings, const TransportSettings
     : lcm_(transport.lcm),
       mocap_(transport, settings.safety, settings.arm),
       node_(transport.lcm.url),
-      dof_(settings.arm.dof()),
+      dof_(2 * settings.arm.size()),
       messages_(settings, provenance, shadow),
       newest_measurement_ns_(kNever),
       newest_go_ns_(kNever),

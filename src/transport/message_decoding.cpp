@@ -33,6 +33,11 @@ std::int64_t length32_at(std::span<const std::byte> bytes, std::size_t offset) n
 /// A length within [0, limit], or -1.
 int bounded(int length, int limit) noexcept { return length <= limit ? length : -1; }
 
+/// Of segments that stretch: all of an arm's, or none.
+bool all_or_none(int stretching, int segments) noexcept {
+  return stretching == 0 || stretching == segments;
+}
+
 /// Whether a text of `length` bytes, terminator included, ends there and not before, and is printable
 /// ASCII: it comes to somebody's terminal. LCM's decoder accepts any byte as the terminator; its
 /// encoder writes up to the first 0.
@@ -106,21 +111,25 @@ bool decode(std::span<const std::byte> bytes,
       kHash + kBeforeVersion + 4 + static_cast<std::size_t>(version) + 4 + 4 + 6 * 4 + 1;
   const int segments = bounded(length16_at(bytes, counts), kMaxSegments);
   const int chambers = bounded(length16_at(bytes, counts + 2), kMaxChambers);
-  if (segments < 0 || chambers < 0) return false;
+  const int stretching = length16_at(bytes, counts + 4);
+  if (segments < 0 || chambers < 0 || !all_or_none(stretching, segments)) return false;
   constexpr std::size_t kSegment = 12 * 4;
   return decode_exactly(bytes,
-                        counts + 4 + kSegment * static_cast<std::size_t>(segments) +
-                            4 * static_cast<std::size_t>(chambers),
+                        counts + 6 + kSegment * static_cast<std::size_t>(segments) +
+                            4 * static_cast<std::size_t>(chambers) +
+                            4 * 4 * static_cast<std::size_t>(stretching),
                         message);
 }
 
 bool decode(std::span<const std::byte> bytes, softarm_messages::plant_state_t& message) noexcept {
   const int segments = bounded(length16_at(bytes, kHash + 8 + 1), kMaxSegments);
   const int chambers = bounded(length16_at(bytes, kHash + 8 + 1 + 2), kMaxChambers);
-  if (segments < 0 || chambers < 0) return false;
+  const int stretching = length16_at(bytes, kHash + 8 + 1 + 4);
+  if (segments < 0 || chambers < 0 || !all_or_none(stretching, segments)) return false;
   return decode_exactly(bytes,
-                        kHash + 8 + 1 + 4 + 4 * 8 * static_cast<std::size_t>(segments) +
-                            4 * static_cast<std::size_t>(chambers) + 3 * 8,
+                        kHash + 8 + 1 + 6 + 4 * 8 * static_cast<std::size_t>(segments) +
+                            4 * static_cast<std::size_t>(chambers) + 3 * 8 +
+                            2 * 8 * static_cast<std::size_t>(stretching),
                         message);
 }
 

@@ -24,14 +24,23 @@ std::int16_t flags_of(const TickOutput& output, bool shadow) noexcept {
   return static_cast<std::int16_t>(flags);
 }
 
-/// Component pairs of a 2n vector; NaN where it is empty.
-void put_pairs(const SegmentVector& from, std::vector<std::vector<float>>& to) noexcept {
+/// The first two of every segment's coordinates; NaN where there are none.
+void put_pairs(const SegmentVector& from, Eigen::Index width,
+               std::vector<std::vector<float>>& to) noexcept {
   for (std::size_t i = 0; i < to.size(); ++i)
     for (std::size_t axis = 0; axis < 2; ++axis) {
-      const auto k = static_cast<Eigen::Index>(2 * i + axis);
+      const Eigen::Index k = width * static_cast<Eigen::Index>(i) + static_cast<Eigen::Index>(axis);
       to[i][axis] =
           k < from.size() ? static_cast<float>(from[k]) : std::numeric_limits<float>::quiet_NaN();
     }
+}
+
+/// The third of every segment's, where segments stretch.
+void put_third(const SegmentVector& from, std::vector<float>& to) noexcept {
+  for (std::size_t i = 0; i < to.size(); ++i) {
+    const auto k = static_cast<Eigen::Index>(3 * i + 2);
+    to[i] = k < from.size() ? static_cast<float>(from[k]) : std::numeric_limits<float>::quiet_NaN();
+  }
 }
 
 }  // namespace
@@ -46,6 +55,7 @@ OutputMessages::OutputMessages(const PipelineSettings& settings, const Provenanc
     : pressure_command{},
       torque_command{},
       status{},
+      width_(settings.arm.segment_dof()),
       by_torque_(settings.actuation.kind == ActuationKind::torque) {
   const auto segments = static_cast<std::size_t>(settings.arm.size());
   const auto chambers = static_cast<std::size_t>(chamber_count(settings.actuation));
@@ -72,6 +82,11 @@ OutputMessages::OutputMessages(const PipelineSettings& settings, const Provenanc
        {&status.phi_rad, &status.theta_rad, &status.residual_twist_rad, &status.residual_length_m})
     list->assign(segments, 0.0F);
   status.pressure_bar.assign(chambers, 0.0F);
+  if (!settings.arm.extensible) return;
+  status.num_stretching = status.num_segments;
+  for (auto* list : {&status.elongation_m, &status.elongation_rate_mps,
+                     &status.reference_elongation_m, &status.axial_force_n})
+    list->assign(segments, 0.0F);
 }
 
 void OutputMessages::set_command(std::int64_t tick, const TickOutput& output) noexcept {
@@ -99,10 +114,14 @@ void OutputMessages::set_status(std::int64_t tick, const ControlPipeline& pipeli
   status.refusal = static_cast<std::int8_t>(output.refusal);
   status.frames_repeated = counter(frames.repeated);
   status.frames_missing = counter(frames.missing);
-  put_pairs(output.motion.u_rad, status.u_rad);
-  put_pairs(output.motion.velocity_radps, status.velocity_radps);
-  put_pairs(output.reference.u, status.reference_u_rad);
-  put_pairs(output.tau_actuation_nm, status.tau_actuation_nm);
+  put_pairs(output.motion.u_rad, width_, status.u_rad);
+  put_pairs(output.motion.velocity_radps, width_, status.velocity_radps);
+  put_pairs(output.reference.u, width_, status.reference_u_rad);
+  put_pairs(output.tau_actuation_nm, width_, status.tau_actuation_nm);
+  put_third(output.motion.u_rad, status.elongation_m);
+  put_third(output.motion.velocity_radps, status.elongation_rate_mps);
+  put_third(output.reference.u, status.reference_elongation_m);
+  put_third(output.tau_actuation_nm, status.axial_force_n);
   for (std::size_t i = 0; i < status.theta_rad.size(); ++i) {
     const float x = status.u_rad[i][0];
     const float y = status.u_rad[i][1];

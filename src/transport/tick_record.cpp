@@ -70,7 +70,7 @@ void get(const tick_frame_t& from, MocapFrame& frame) {
 /// The largest possible record of this arm.
 tick_record_t largest_record(const PipelineSettings& settings, const std::string& build) {
   tick_record_t record{};
-  const auto dof = static_cast<std::size_t>(settings.arm.dof());
+  const auto dof = static_cast<std::size_t>(2 * settings.arm.size());
   const auto chambers = static_cast<std::size_t>(chamber_count(settings.actuation));
   record.num_chambers = static_cast<std::int16_t>(chambers);
   record.pressure_bar.resize(chambers);

@@ -157,6 +157,35 @@ def velocities(log, directory):
     return "velocities.png", "Velocity of u as the filter estimates it."
 
 
+def elongations(log, directory):
+    """Elongation of every segment that stretches, and its error."""
+    if log.elongation_m is None:
+        return None
+    shown = _shown_segments(log)
+    true_m, reference_m = log.true_elongation_m, log.reference_elongation_m
+    error_m = None if true_m is None or reference_m is None else reference_m - true_m
+    figure, grid = _grid(len(shown), 2 if error_m is not None else 1, row_height=1.55)
+    t, measured_m, true_m, reference_m, error_m = thinned(log.t_s, log.elongation_m, true_m, reference_m, error_m)
+    for row, segment in enumerate(shown):
+        axes = grid[row][0]
+        if true_m is not None:
+            axes.plot(t, 1e3 * measured_m[:, segment], **ESTIMATE_STYLE)
+        axes.plot(t, 1e3 * (measured_m if true_m is None else true_m)[:, segment], color=INK)
+        if reference_m is not None:
+            axes.plot(t, 1e3 * reference_m[:, segment], **REFERENCE_STYLE)
+        axes.set_ylabel(f"$e_{{{segment + 1}}}$ [mm]")
+        at_least(axes, 0.5)
+        if error_m is not None:
+            axes = grid[row][1]
+            axes.plot(t, 1e3 * error_m[:, segment], color=INK, linewidth=0.9)
+            axes.set_ylabel("error [mm]")
+            at_least(axes, 0.1)
+            _limit_to_active(axes, log, t, 1e3 * error_m[:, segment:segment + 1])
+    finish(figure, directory / "elongations.png", "Elongation" + _selection_note(log),
+           _source_handles(log) + time_axes(grid, log))
+    return "elongations.png", "Length of every segment minus its length at rest, and reference minus arm."
+
+
 def recording(log, directory):
     """u, its velocity and residuals in one picture: for a log without the true state."""
     if _has_truth(log) or log.velocity is None or log.twist_rad is None or log.segments > 1:
@@ -349,4 +378,5 @@ def residuals(log, directory):
                              "expected chord, age of the newest frame at the tick, and when a limit cut the command.")
 
 
-ALL = (*shapes.ALL, figure9, curvature, recording, pressures, tip_path, residuals, velocities, tick_times)
+ALL = (*shapes.ALL, figure9, curvature, recording, pressures, tip_path, residuals, velocities, elongations,
+       tick_times)

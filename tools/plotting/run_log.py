@@ -55,6 +55,10 @@ class RunLog:
         self.true_u = self._pairs("true{}_{}_rad")
         self.twist_rad = self._per_segment("twist{}_rad")
         self.length_m = self._per_segment("length{}_m")
+        # Of arms that stretch.
+        self.elongation_m = self._per_segment("e{}_m")
+        self.reference_elongation_m = self._per_segment("eref{}_m")
+        self.true_elongation_m = self._per_segment("etrue{}_m")
         self.tip_m = self._point("tip_{}_m")
         self.tip_reference_m = self._point("tipref_{}_m")
 

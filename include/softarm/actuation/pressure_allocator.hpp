@@ -10,6 +10,7 @@
 
 #include "softarm/actuation/settings.hpp"
 #include "softarm/model/arm.hpp"
+#include "softarm/model/coordinates.hpp"
 
 namespace softarm {
 
@@ -19,8 +20,6 @@ inline constexpr int kMaxChambers = kMaxChambersPerSegment * kMaxSegments;
 /// One pressure per chamber (bar), segment by segment in the order of the valves. Storage in place:
 /// never allocates.
 using PressureVector = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, kMaxChambers, 1>;
-/// One number per segment.
-using SegmentScalars = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, kMaxSegments, 1>;
 
 /// The chambers of one segment: which tau_A they can reach, and the pressures that give it.
 /// `Dimension` is the number of torque components: two, or one in the plane of a planar arm.
@@ -74,6 +73,69 @@ class ChamberMap {
   std::array<Facet, 2 * kMaxChambersPerSegment> facet_{};
 };
 
+/// The chambers of one segment that stretches: pressures push, so they also lengthen it. Which axial
+/// forces go with a torque, and the pressures that give both.
+class AxialChamberMap {
+ public:
+  using Torque = ChamberMap<2>::Torque;
+  using Pressures = ChamberMap<2>::Pressures;
+
+  AxialChamberMap() = default;
+  /// columns: w_j (N m per bar); areas: N per bar; limits and bias in bar.
+  AxialChamberMap(const std::vector<Torque>& columns, const std::vector<double>& areas_n_per_bar,
+                  double min_pressure_bar, double max_pressure_bar, double bias_pressure_bar);
+
+  /// An interval of axial forces.
+  struct Range {
+    double low_n, high_n;
+  };
+  /// The axial forces that are within reach together with exactly this torque, which is reachable
+  /// itself. Exact, one pass over the facets of the zonotope of (torque, axial force).
+  Range axial_range(const Torque& torque_nm) const noexcept;
+
+  /// The axial force nearest to `wanted_n` that goes with this torque, smoothly: a soft maximum of
+  /// `wanted_n` and the lower facets, then a soft minimum with the upper ones, each of the form
+  /// w log sum exp(x / w) with w = smoothing() . Infinitely differentiable in both arguments, and
+  /// above the lower limit by at most w log(facets + 1).
+  double within_reach(const Torque& torque_nm, double wanted_n) const noexcept;
+  /// w of within_reach(), N: what 0.02 bar of a chamber gives.
+  double smoothing_n() const noexcept { return smoothing_n_; }
+
+  /// Bending first: the largest s in [0, 1] for which s torque is reachable, then the axial force
+  /// that goes with it and is nearest to `axial_n`, then the pressures nearest the bias. Continuous.
+  /// Torque and axial force are met to 1e-9 of what all chambers give together. What is not finite
+  /// is out of reach: s = 0, or the lowest axial force. Returns s.
+  double allocate(const Torque& torque_nm, double axial_n, Pressures& pressures_bar) const noexcept;
+
+  /// N of `size()` pressures (bar).
+  double axial_force(const double* pressures_bar) const noexcept;
+  /// N m of `size()` pressures (bar).
+  Torque torque(const double* pressures_bar) const noexcept {
+    return bending_.torque(pressures_bar);
+  }
+  const ChamberMap<2>& bending() const noexcept { return bending_; }
+  int size() const noexcept { return bending_.size(); }
+
+ private:
+  static constexpr int kMostFacets = kMaxChambersPerSegment * (kMaxChambersPerSegment - 1) / 2;
+  using Column = std::array<double, 3>;
+  /// axial <= value + slope' torque where it is an upper one, >= where it is a lower one; N, N m.
+  struct Facet {
+    Torque slope{};
+    double value = 0.0;
+    double at(const Torque& t) const noexcept { return value + slope[0] * t[0] + slope[1] * t[1]; }
+  };
+
+  ChamberMap<2> bending_;
+  std::array<Column, kMaxChambersPerSegment> column_{};  ///< N m, N m, axial force times lever_m_
+  double min_ = 0.0, max_ = 0.0, bias_ = 0.0;
+  double lever_m_ = 1.0;  ///< makes the third row comparable with the others
+  double smoothing_n_ = 0.0;
+  double most_n_ = 0.0;  ///< all chambers together
+  int facets_ = 0;       ///< lower ones, and as many upper ones
+  std::array<Facet, kMostFacets> lower_{}, upper_{};
+};
+
 /// Result of PressureAllocator::allocate.
 struct Allocation {
   PressureVector pressures_bar;
@@ -89,12 +151,16 @@ class PressureAllocator {
   /// @throws std::invalid_argument (segment, expected, got, fix) for a map that cannot reach every
   /// torque direction: fewer than 3 chambers (2 if planar) or more than kMaxChambersPerSegment, a
   /// gain that is not positive, all chambers in a half plane, limits that exclude zero torque.
-  explicit PressureAllocator(const ActuationSettings& settings);
+  /// @param extensible of an arm whose segments stretch: tau_A has three rows a segment below,
+  /// (tau_x, tau_y, N) with N the axial force in N; neither planar nor with actuation by torque.
+  explicit PressureAllocator(const ActuationSettings& settings, bool extensible = false);
 
   /// Number of segments.
   int segments() const noexcept { return segments_; }
   /// Chambers of all segments together.
   int chambers() const noexcept { return chambers_; }
+  /// Components of tau_A of the whole arm: 2n, or 3n where segments stretch.
+  int dimension() const noexcept { return (axial_.empty() ? 2 : 3) * segments_; }
   /// Index in a PressureVector of the first chamber of a segment (from 0).
   int first_chamber(int segment) const noexcept;
   /// Number of chambers of a segment (from 0).
@@ -102,7 +168,7 @@ class PressureAllocator {
 
   /// tau_actuation_nm: 2n, (tau_x, tau_y) about the local axes. Finds per segment the largest s <=
   /// 1 for which s tau is reachable within the pressure limits, then the pressures nearest the bias
-  /// that give exactly s tau. No slew limit.
+  /// that give exactly s tau. No slew limit. Where segments stretch, 3n: as AxialChamberMap.
   void allocate(ConstVectorRef tau_actuation_nm, Allocation& out) const noexcept;
 
   /// tau_A (2n, N m) that pressures (all chambers, bar) give.
@@ -110,6 +176,9 @@ class PressureAllocator {
 
   /// Generalized force f in u (2n, N m) that pressures give: A_chamber tau_A.
   void generalized_force(ConstVectorRef pressures_bar, VectorRef force_nm) const noexcept;
+
+  /// Of a segment (from 0) that stretches.
+  const AxialChamberMap& axial(int segment) const noexcept { return axial_[segment]; }
 
  private:
   struct Segment {
@@ -123,6 +192,7 @@ class PressureAllocator {
   bool planar_ = false;
   std::array<double, 2> plane_{};  ///< direction of tau_A that bends in the plane
   std::vector<Segment> segment_;
+  std::vector<AxialChamberMap> axial_;  ///< one a segment where segments stretch
 };
 
 }  // namespace softarm

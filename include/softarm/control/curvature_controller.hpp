@@ -12,7 +12,8 @@
 
 namespace softarm {
 
-/// What the controller asks of the actuation: 2n numbers each.
+/// What the controller asks of the actuation: 2n numbers each; 3n, with the axial force (N) as every
+/// third, where segments stretch.
 struct ControlOutput {
   SegmentVector tau_u_nm;  ///< generalized force in u (N m)
   SegmentVector
@@ -27,6 +28,9 @@ struct ControlOutput {
 /// or in the paper's polar coordinates, evaluated in u through the exact chain rule. On the model
 /// it was given it leaves (18), B e'' + C e' = -(K + K_P) e - (D + K_D) e', in the chosen
 /// coordinates.
+///
+/// Where segments stretch the same in q = (u, e), 3n numbers, three a segment: K and K_P in N/m, D and
+/// K_D in N s/m along e.
 class CurvatureController {
  public:
   /// Throws std::invalid_argument (expected, got) where gains do not fit the arm.
@@ -55,6 +59,7 @@ class CurvatureController {
   const SegmentVector& integral_nm() const noexcept { return integral_; }
 
  private:
+  template <int Width>
   void feedback_u(ConstVectorRef u, ConstVectorRef velocity, const ReferenceSample& reference,
                   ControlOutput& out) noexcept;
   void feedback_polar(ConstVectorRef u, ConstVectorRef velocity, const ReferenceSample& reference,

@@ -13,6 +13,7 @@
 
 #include "softarm/control/settings.hpp"
 #include "softarm/model/arm.hpp"
+#include "softarm/model/coordinates.hpp"
 
 namespace softarm {
 
@@ -57,15 +58,19 @@ class Reference {
  public:
   /// Throws ReferenceError for sizes, times or limits of a phase that do not fit, and
   /// std::invalid_argument for other settings.
+  /// Where segments stretch, samples have 3n numbers, [u_x, u_y, e] a segment.
+  /// @param natural_elongation_m n: e in phases that give none, and where e rests in phases of the
+  /// tip; empty: zero
   Reference(const ReferenceSettings& settings, const ControllerSettings& control,
-            const ArmParameters& arm);
+            const ArmParameters& arm, const SegmentScalars& natural_elongation_m = {});
   /// Where no phase is in task space, the number of segments is all that matters.
   Reference(const ReferenceSettings& settings, const ControllerSettings& control, int segments);
   ~Reference();
   Reference(Reference&&) noexcept;
   Reference& operator=(Reference&&) noexcept;
 
-  /// Starts the reference's time at `time_s` with the arm at u (2n, rad), velocity (2n, rad/s).
+  /// Starts the reference's time at `time_s` with the arm at u (2n, rad; 3n where segments stretch),
+  /// velocity (the same, rad/s and m/s).
   void start(double time_s, ConstVectorRef u, ConstVectorRef velocity) noexcept;
   bool started() const noexcept;
 
@@ -86,7 +91,7 @@ class Reference {
   /// the start.
   void window(double time_s, double lookahead_s, ReferenceWindow& out) const noexcept;
 
-  /// A live reference arrived: 2n numbers each; rad, rad/s, rad/s^2. Between messages it is
+  /// A live reference arrived: 2n numbers each, curvatures alone; rad, rad/s, rad/s^2. Between messages it is
   /// extrapolated with the received derivatives; after `timeout_s` it returns to the last received
   /// u and rests there.
   LiveVerdict receive(double time_s, ConstVectorRef u, ConstVectorRef velocity,

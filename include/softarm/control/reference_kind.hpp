@@ -24,7 +24,8 @@
 
 namespace softarm {
 
-/// A reference at one time: 2n numbers each; rad, rad/s, rad/s^2.
+/// A reference at one time: 2n numbers each; rad, rad/s, rad/s^2. Reference gives 3n where segments
+/// stretch, with e (m, m/s, m/s^2) as every third.
 struct ReferenceSample {
   SegmentVector u;
   SegmentVector velocity;

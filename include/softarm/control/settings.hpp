@@ -3,6 +3,7 @@
 // config/template.yaml documents every setting.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "softarm/control/reference_kinds.hpp"
@@ -52,6 +53,8 @@ struct ControllerSettings {
   /// Diagonal of an integral gain on u_ref - u (N m/(rad s)), in u whatever the coordinates; not in
   /// the paper. Empty or zero: none, at no cost.
   std::vector<double> ki;
+  /// The same along e of segments that stretch, one a segment: N/m, N s/m, N/(m s). Empty: zero.
+  std::vector<double> kp_axial, kd_axial, ki_axial;
   DisturbanceRejection disturbance = DisturbanceRejection::cancel;
   double valve_lag_s = 0.0;
   double dead_time_s = 0.0;
@@ -63,10 +66,21 @@ struct ControllerSettings {
   TaskSpaceSettings task_space;
 };
 
+/// The elongation of every segment that stretches, mean + amplitude sin(rate t), t since the phase
+/// began.
+struct ElongationPath {
+  std::optional<double> mean_m = {};  ///< none: the natural elongation
+  double amplitude_m = 0.0;
+  double rate_radps = 0.0;
+};
+
 /// One phase of a sequence; the last one has no end.
 struct ReferencePhase {
   ReferenceKind kind;
   double duration_s = 0.0;  ///< ignored for the last phase
+  /// Of a phase that gives curvatures: what it asks of segments that stretch. It is followed as far
+  /// as pressures can (ElongationReference).
+  ElongationPath elongation = {};
 };
 
 /// What the arm is to follow: phases, one after the other.

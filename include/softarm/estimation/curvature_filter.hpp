@@ -16,9 +16,9 @@ namespace softarm {
 /// smooths only the deviation from it, so that even a slow filter adds no lag to a motion that was
 /// commanded.
 struct KnownMotion {
-  SegmentVector u_rad;                ///< 2n
-  SegmentVector velocity_radps;       ///< 2n
-  SegmentVector acceleration_radps2;  ///< 2n
+  SegmentVector u_rad;                ///< 2n; [u_x, u_y, e] a segment where segments stretch
+  SegmentVector velocity_radps;       ///< the same
+  SegmentVector acceleration_radps2;  ///< the same
   /// Which motion this is a sample of. When it changes, the filter carries its memory over; samples
   /// of one source must belong to one smooth function of time.
   std::uint32_t source = 0;
@@ -27,8 +27,9 @@ struct KnownMotion {
 /// The filter's word about one instant.
 struct FilteredMotion {
   int segments = 0;
-  SegmentVector u_rad;           ///< 2n; zero where not valid
-  SegmentVector velocity_radps;  ///< 2n; zero where not valid
+  /// 2n; where segments stretch [u_x, u_y, e] of each, e in m. Zero where not valid.
+  SegmentVector u_rad;
+  SegmentVector velocity_radps;  ///< the same, rad/s and m/s
   std::array<bool, kMaxSegments> valid{};
 
   /// True where every segment is valid (and there is one).
@@ -56,11 +57,16 @@ FilterNoise filter_noise(double bandwidth_radps, double period_s, double horizon
 /// about 3 j / bandwidth^2, the error of u j / bandwidth^3. A segment starts as if it had been at
 /// rest where it was first seen, with the weight of one frame. Allocates nothing after
 /// construction.
+///
+/// Where segments stretch, e is the measured length minus the length at rest, fitted in the same
+/// way; a frame in which a length says nothing (theta = 2 pi) leaves out the segment.
 class CurvatureFilter {
  public:
   /// @throws std::invalid_argument where n is out of range, the bandwidth not positive and finite,
   /// or predicted_frames negative.
   CurvatureFilter(const EstimationSettings& settings, int segments);
+  /// Of an arm whose segments may stretch.
+  CurvatureFilter(const EstimationSettings& settings, const ArmParameters& arm);
 
   /// Takes one accepted frame. `known`, if any, is the expected motion at `capture_ns`.
   /// A capture that is not later than the last one is ignored. A segment that the estimate does not
@@ -88,29 +94,54 @@ class CurvatureFilter {
 
  private:
   // Sums over the measurements with weight w = exp(-a) at scaled age a = bandwidth * age:
-  // everything the fit needs.
+  // everything the fit of one quantity of a segment (u, or e) needs.
+  template <int D>
+  struct Fit {
+    using Value = Eigen::Matrix<double, D, 1>;
+    std::array<Value, 3> deviation;  // sum w a^m (measured - known)
+    std::array<Value, 3> fit;        // deviation and its scaled derivatives at the newest frame
+  };
+  template <int D>
+  using Quadratic =
+      std::array<Eigen::Matrix<double, D, 1>, 3>;  // value, derivatives in scaled time
   struct Memory {
-    std::array<double, 5> weight{};            // sum w a^m
-    std::array<Eigen::Vector2d, 3> deviation;  // sum w a^m (u - known)
-    std::array<Eigen::Vector2d, 3> fit;  // deviation and its scaled derivatives at the newest frame
-    int unseen = 0;                      // frames in a row
+    std::array<double, 5> weight{};  // sum w a^m
+    Fit<2> u;
+    int unseen = 0;  // frames in a row
     bool valid = false;
   };
-  using Quadratic =
-      std::array<Eigen::Vector2d, 3>;  // value and derivatives with respect to scaled time
 
-  Quadratic known_at(int segment, double scaled_time) const noexcept;
+  template <int D>
+  static Quadratic<D> later(const Quadratic<D>& known, double scaled_time) noexcept;
+  template <int D>
+  Quadratic<D> known_part(const KnownMotion& known, int at) const noexcept;
+  template <int D>
+  static void adopt(const std::array<double, 5>& weight, double step, bool changed,
+                    const Quadratic<D>& now, Quadratic<D>& known, Fit<D>& fit) noexcept;
   void adopt(const KnownMotion* known, double step) noexcept;
-  static void age(Memory& memory, double step) noexcept;
-  static void shift(Memory& memory, const Quadratic& change) noexcept;
+  template <int D>
+  static void shift(const std::array<double, 5>& weight, const Quadratic<D>& change,
+                    Fit<D>& fit) noexcept;
+  static void age(Memory& memory, Fit<1>* stretch, double step) noexcept;
+  template <int D>
+  static void start(const Eigen::Matrix<double, D, 1>& deviation, Fit<D>& fit) noexcept;
   static void start(Memory& memory, const Eigen::Vector2d& deviation) noexcept;
-  static void observe(Memory& memory, const Eigen::Vector2d& deviation) noexcept;
-  static void solve(Memory& memory) noexcept;
+  template <int D>
+  static void solve(const std::array<double, 5>& weight, Fit<D>& fit) noexcept;
+  template <int D>
+  void evaluate(const Fit<D>& fit, const Quadratic<D>& known, double ahead, int at,
+                const KnownMotion* same_source, FilteredMotion& out) const noexcept;
+  void observe(std::size_t segment, const CurvatureEstimate& estimate) noexcept;
+  Eigen::Index width() const noexcept { return stretch_.empty() ? 2 : 3; }
 
   double bandwidth_radps_;
   int predicted_frames_;
   std::vector<Memory> memory_;
-  std::vector<Quadratic> known_;  // at the newest frame, scaled time
+  std::vector<Quadratic<2>> known_;  // at the newest frame, scaled time
+  // Where segments stretch; otherwise empty.
+  std::vector<Fit<1>> stretch_;
+  std::vector<Quadratic<1>> known_stretch_;
+  std::vector<double> length_m_;  // at rest
   std::uint32_t source_ = 0;
   bool has_known_ = false;
   bool has_frame_ = false;

@@ -34,6 +34,7 @@ class ExperimentLog {
 
   OutputFile file_;
   int segments_;
+  bool stretches_;
   int chambers_;
   std::string line_;
 };

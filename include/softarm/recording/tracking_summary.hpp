@@ -94,6 +94,7 @@ class TrackingSummary {
   };
   struct Json;  ///< makes the parts of json()
   void add_tracking(const LogRow& row);
+  void add_elongation(const LogRow& row);
   void add_tip(const LogRow& row);
   std::string tip_line() const;
 
@@ -108,6 +109,8 @@ class TrackingSummary {
   MeanSquare u_;
   double u_max_rad_ = std::numeric_limits<double>::quiet_NaN();
   std::vector<MeanSquare> u_of_segment_, theta_, phi_;
+  std::vector<MeanSquare> elongation_;  ///< of segments that stretch
+  double elongation_max_m_ = 0.0;       ///< largest error of one
   TipErrors tip_;
   double tip_max_m_ = std::numeric_limits<double>::quiet_NaN();
   bool tip_is_asked_ = false;    ///< the reference was a path of the tip

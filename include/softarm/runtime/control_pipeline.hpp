@@ -26,6 +26,7 @@
 
 namespace softarm {
 
+class ElongationReference;
 class ModelObserver;
 
 /// A live reference as it came over the wire: 2n numbers each; rad, rad/s, rad/s^2.
@@ -76,8 +77,9 @@ struct TickOutput {
   /// Correction of the model, its deviations and the innovations; null without a model-based
   /// observer, and while it does not run and `motion` is the kinematic filter's.
   const ModelObserver* observer = nullptr;
-  SegmentVector tau_actuation_nm;  ///< (17); empty unless ACTIVE
-  PressureVector pressure_bar;     ///< to be sent
+  /// (17); empty unless ACTIVE. As of `motion` and `reference`: 3n where segments stretch.
+  SegmentVector tau_actuation_nm;
+  PressureVector pressure_bar;  ///< to be sent
 };
 
 /// The same object runs in the daemon, in lock-step simulation and in replay. Reads no clock,
@@ -138,6 +140,7 @@ class ControlPipeline {
   Reference reference_;
   CurvatureController controller_;
   PressureAllocator allocator_;
+  std::unique_ptr<ElongationReference> elongation_;  ///< where segments stretch
   PressureRamps ramps_;
   PressureWatch pressure_watch_;
   CommandMoves command_moves_;

@@ -194,13 +194,20 @@ class OscillationWatch {
 /// The controller's model has segments of constant length. A measured length that is another one for
 /// long means an arm that stretches, a marker frame that slipped or a wrong number in the
 /// configuration: the tip is then not where it is reported. No allocation, no clock.
+///
+/// Of segments that stretch: a length that is not the modelled one under control, and otherwise one
+/// that no pressure gives.
 class LengthWatch {
  public:
-  LengthWatch(const SafetySettings& settings, const ArmParameters& arm);
+  /// @param most_elongation_m n, of segments that stretch, at the highest pressure; otherwise empty
+  LengthWatch(const SafetySettings& settings, const ArmParameters& arm,
+              const SegmentScalars& most_elongation_m = {});
 
   /// The lengths of an accepted frame. A length whose standard deviation is above a third of a limit
   /// is no evidence for or against it.
-  void judge(std::int64_t capture_ns, const CurvatureEstimate& estimate) noexcept;
+  /// @param expected [u_x, u_y, e] a segment, of segments that stretch; null: not known
+  void judge(std::int64_t capture_ns, const CurvatureEstimate& estimate,
+             const SegmentVector* expected = nullptr) noexcept;
 
   /// Some segment's length was off by more than the warning throughout the settling time.
   bool warns() const noexcept { return warning_.exceeded; }
@@ -218,9 +225,10 @@ class LengthWatch {
     bool beyond = false;
     std::array<std::int64_t, kMaxSegments> since_ns{};  ///< kNever while within the limit
   };
-  void judge(std::int64_t capture_ns, const CurvatureEstimate& estimate, Limit& limit) noexcept;
+  void judge(std::int64_t capture_ns, const CurvatureEstimate& estimate,
+             const SegmentVector* expected, Limit& limit) noexcept;
 
-  std::vector<double> length_m_;
+  std::vector<double> length_m_, reach_m_;
   std::int64_t settling_ns_;
   Limit warning_, fault_;
 };

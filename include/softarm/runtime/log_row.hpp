@@ -18,9 +18,11 @@ struct LogRow {
   Reason reason = Reason::none;
   bool saturated = false;
   double frame_age_s = std::numeric_limits<double>::quiet_NaN();
-  SegmentVector u, velocity, reference, truth;        ///< 2n each, rad and rad/s
-  SegmentVector tau_actuation;                        ///< 2n, N m
-  SegmentVector residual_torsion, residual_length;    ///< n each, rad and m
+  SegmentVector u, velocity, reference, truth;      ///< 2n each, rad and rad/s
+  SegmentVector tau_actuation;                      ///< 2n, N m
+  SegmentVector residual_torsion, residual_length;  ///< n each, rad and m
+  /// Of segments that stretch, n each, m and N: measured, asked, of the simulated arm, commanded.
+  SegmentScalars elongation, elongation_reference, elongation_truth, axial_force;
   PressureVector commanded, real;                     ///< bar
   std::optional<Eigen::Vector3d> tip, tip_reference;  ///< m, world
   bool tip_is_asked =

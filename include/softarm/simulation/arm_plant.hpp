@@ -8,6 +8,7 @@
 #include <span>
 
 #include "softarm/model/arm.hpp"
+#include "softarm/model/coordinates.hpp"
 #include "softarm/simulation/plant_error.hpp"
 #include "softarm/simulation/settings.hpp"
 #include "softarm/simulation/valves.hpp"
@@ -74,6 +75,9 @@ class ArmPlant {
   void curvature(SegmentVector& u_rad, SegmentVector& velocity_radps) const noexcept;
   SegmentVector u_rad() const noexcept;
   SegmentVector velocity_radps() const noexcept;
+  /// e (n, m) and e' (m/s) where segments stretch, otherwise empty.
+  SegmentScalars elongation_m() const noexcept;
+  SegmentScalars elongation_rate_mps() const noexcept;
 
   /// The coordinates of the kind at hand and their rates, `dof()` each: u of every segment (pcc;
   /// where segments stretch [u_x, u_y, e] with e in m) or piece (refined), or the angles about x and

@@ -52,6 +52,8 @@ struct ArmStatus {
   SegmentScalars phi_rad, theta_rad;           ///< the same u in polar coordinates
   SegmentScalars torsion_rad, length_error_m;  ///< residuals: a PCC segment has none
   PressureVector pressure_bar;                 ///< commanded, bar; N m with actuation by torque
+  /// n each where segments stretch, otherwise empty: m, m/s, m and N; the last two NaN unless ACTIVE.
+  SegmentScalars elongation_m, elongation_rate_mps, reference_elongation_m, axial_force_n;
 
   /// Number of segments n.
   int segments() const noexcept { return static_cast<int>(theta_rad.size()); }
@@ -72,7 +74,8 @@ struct PlantState {
   bool vented = false;                  ///< no command is valid: all valves are at zero
   SegmentVector u_rad, velocity_radps;  ///< 2n numbers each
   PressureVector pressure_bar;          ///< behind the valves; N m with actuation by torque
-  Eigen::Vector3d tip_m = Eigen::Vector3d::Zero();  ///< world frame
+  Eigen::Vector3d tip_m = Eigen::Vector3d::Zero();   ///< world frame
+  SegmentScalars elongation_m, elongation_rate_mps;  ///< n where segments stretch, otherwise empty
 
   /// Number of segments n.
   int segments() const noexcept { return static_cast<int>(u_rad.size() / 2); }

@@ -44,6 +44,7 @@ class OutputMessages {
   softarm_messages::controller_status_t status;
 
  private:
+  Eigen::Index width_;  ///< coordinates of a segment
   bool by_torque_;
 };
 

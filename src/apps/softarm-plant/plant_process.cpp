@@ -187,6 +187,10 @@ void PlantProcess::publish_state() {
   state_message_.pressure_bar = measurement_message_.pressure_bar;
   const Eigen::Vector3d tip = plant.tip_m();
   for (int axis = 0; axis < 3; ++axis) state_message_.tip_m[axis] = tip[axis];
+  const SegmentScalars elongation = plant.elongation_m(), rate = plant.elongation_rate_mps();
+  state_message_.num_stretching = static_cast<std::int16_t>(elongation.size());
+  state_message_.elongation_m.assign(elongation.begin(), elongation.end());
+  state_message_.elongation_rate_mps.assign(rate.begin(), rate.end());
   node_.publish(lcm_.plant_channel, state_message_);
 }
 

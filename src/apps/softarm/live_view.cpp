@@ -52,7 +52,9 @@ void LiveView::draw(const StatusRecord& record) {
       1e3 * status.frame_age_s, status.frames_accepted, status.frames_rejected,
       status.frames_repeated, status.frames_missing, status.overruns, status.messages_malformed);
   const bool torque = experiment_.actuation.kind == ActuationKind::torque;
-  text += fmt::format("segment   theta [rad]   phi [rad]   error of u [mrad]   {}\n",
+  const bool stretches = status.elongation_m.size() > 0;
+  text += fmt::format("segment   theta [rad]   phi [rad]   error of u [mrad]   {}{}\n",
+                      stretches ? "elongation [mm]   error [mm]   " : "",
                       torque ? "moments [N m]" : "pressures [bar]");
   for (int i = 0; i < std::min(status.segments(), kShownSegments); ++i)
     text += segment_text(status, i);
@@ -72,6 +74,12 @@ std::string LiveView::segment_text(const ArmStatus& status, int segment) const {
     text += fmt::format("{:17.2f}  ", 1e3 * error_rad.norm());
   } else {
     text += fmt::format("{:>17}  ", "-");
+  }
+  if (status.elongation_m.size() > 0) {
+    text += fmt::format("{:15.2f}   ", 1e3 * status.elongation_m[segment]);
+    const double error_m = status.reference_elongation_m[segment] - status.elongation_m[segment];
+    text += std::isfinite(error_m) ? fmt::format("{:10.2f}  ", 1e3 * error_m)
+                                   : fmt::format("{:>10}  ", "-");
   }
   const auto& segments = experiment_.actuation.segments;
   const auto index = static_cast<std::size_t>(segment);

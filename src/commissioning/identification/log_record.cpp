@@ -143,7 +143,7 @@ class LogReader {
           inputs_.time_s.size(), wrong_size_));
     MotionRecord out;
     out.time_s = frames_.times().array() - frames_.time_s.front();
-    out.u_rad = frames_.rows(experiment_.arm.dof());
+    out.u_rad = frames_.rows(2 * experiment_.arm.size());
     out.input.time_s = inputs_.times().array() - frames_.time_s.front();
     out.input.value = inputs_.rows(static_cast<Eigen::Index>(chambers_));
     out.input.held = input_ == LoggedInput::commanded;

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "commissioning/preflight/geometry.hpp"
+#include "softarm/model/coordinates.hpp"
 #include "softarm/model/statics.hpp"
 #include "softarm/transport/settings.hpp"
 
@@ -105,9 +106,10 @@ Finding check_rest_pose(const Experiment& experiment, const MeanPoses& rest) {
     out.text = "not every segment seen";
     return out;
   }
-  DynamicsWorkspace workspace(experiment.arm);
-  Eigen::VectorXd off_nm(experiment.arm.dof());
-  static_moments(experiment.arm, workspace, u_rad, off_nm);
+  const ArmParameters arm = at_rest_length(experiment.arm);
+  DynamicsWorkspace workspace(arm);
+  Eigen::VectorXd off_nm(arm.dof());
+  static_moments(arm, workspace, u_rad, off_nm);
   std::vector<std::string> wrong;
   double bend_rad = 0.0, twist_rad = 0.0;
   for (std::size_t i = 0; i + 1 < rest.body.size(); ++i) {

@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "commissioning/preflight/geometry.hpp"
+#include "softarm/model/coordinates.hpp"
 #include "softarm/model/statics.hpp"
 
 namespace softarm {
@@ -127,10 +128,11 @@ std::optional<PulseResponse> response_to(const Experiment& experiment, const Obs
                     before_rad) ||
       !curvature_of(experiment, mean_poses(seen, pulse.held_ns, pulse.end_ns, bodies), held_rad))
     return std::nullopt;
-  DynamicsWorkspace workspace(experiment.arm);
-  Eigen::VectorXd moment_nm(experiment.arm.dof()), before_nm(experiment.arm.dof());
-  static_moments(experiment.arm, workspace, held_rad, moment_nm);
-  static_moments(experiment.arm, workspace, before_rad, before_nm);
+  const ArmParameters arm = at_rest_length(experiment.arm);
+  DynamicsWorkspace workspace(arm);
+  Eigen::VectorXd moment_nm(arm.dof()), before_nm(arm.dof());
+  static_moments(arm, workspace, held_rad, moment_nm);
+  static_moments(arm, workspace, before_rad, before_nm);
   moment_nm -= before_nm;
   const Chamber& chamber = experiment.actuation.segments[static_cast<std::size_t>(pulse.segment)]
                                                         [static_cast<std::size_t>(pulse.chamber)];

@@ -28,9 +28,12 @@ Matrices matrices(const ArmParameters& arm, const VectorXd& u, const VectorXd& v
   Matrices m{MatrixXd(dof, dof), MatrixXd(dof, dof), VectorXd(dof), VectorXd(dof), VectorXd(dof)};
   DynamicsWorkspace workspace(arm);
   dynamics_matrices(arm, workspace, u, velocity, m.B, m.C, m.G);
+  const int width = arm.segment_dof();
   for (int i = 0; i < dof; ++i) {
-    m.k[i] = arm.segments[static_cast<std::size_t>(i / 2)].stiffness_nm_per_rad;
-    m.beta[i] = arm.segments[static_cast<std::size_t>(i / 2)].damping_nms_per_rad;
+    const SegmentParameters& segment = arm.segments[static_cast<std::size_t>(i / width)];
+    const bool axial = i % width == 2;
+    m.k[i] = axial ? segment.axial_stiffness_n_per_m : segment.stiffness_nm_per_rad;
+    m.beta[i] = axial ? segment.axial_damping_ns_per_m : segment.damping_nms_per_rad;
   }
   return m;
 }
@@ -67,6 +70,53 @@ TEST(CurvatureController, LeavesTheClosedLoop18) {
                            (m.beta + map(settings.kd)).cwiseProduct(ed);
     EXPECT_LT((left - right).norm(), 1e-11 * (1.0 + right.norm())) << "n " << n;
     EXPECT_FALSE(out.bounded);
+  }
+}
+
+// The same in (u, e): B x'' + C x' = -(K + K_P) x - (D + K_D) x' with x = q_ref - q, three rows.
+TEST(CurvatureController, LeavesTheClosedLoopOfSegmentsThatStretch) {
+  test::Random random(3);
+  for (int trial = 0; trial < 100; ++trial) {
+    const int n = 1 + trial % 4;
+    ArmParameters arm = test::random_arm(n, random);
+    arm.extensible = true;
+    arm.mass = n <= 2 && trial % 2 == 0 ? MassModel::point : MassModel::distributed;
+    for (SegmentParameters& segment : arm.segments) {
+      segment.axial_stiffness_n_per_m = random.uniform(1e3, 1e4);
+      segment.axial_damping_ns_per_m = random.uniform(20.0, 200.0);
+    }
+    ControllerSettings settings = test::gains(n, 0.0, 0.0);
+    for (double& g : settings.kp) g = random.uniform(0.0, 2.0);
+    for (double& g : settings.kd) g = random.uniform(0.0, 0.1);
+    VectorXd kp(3 * n), kd(3 * n);
+    for (int i = 0; i < n; ++i) {
+      settings.kp_axial.push_back(random.uniform(0.0, 5e3));
+      settings.kd_axial.push_back(random.uniform(0.0, 50.0));
+      const auto k = static_cast<std::size_t>(i);
+      kp.segment<3>(3 * i) << settings.kp[2 * k], settings.kp[2 * k + 1], settings.kp_axial[k];
+      kd.segment<3>(3 * i) << settings.kd[2 * k], settings.kd[2 * k + 1], settings.kd_axial[k];
+    }
+    const auto state = [&](double bend, double stretch) {
+      VectorXd v(3 * n);
+      for (int i = 0; i < n; ++i)
+        v.segment<3>(3 * i) << random.vector(2, bend), random.uniform(-stretch, stretch);
+      return v;
+    };
+    const VectorXd q = state(1.5, 0.02), qd = state(3.0, 0.1), qr = state(1.5, 0.02),
+                   qrd = state(3.0, 0.1), qrdd = state(10.0, 1.0);
+    CurvatureController controller(arm, settings);
+    ControlOutput out;
+    controller.compute(q, qd, test::at(qr, qrd, qrdd), out);
+    VectorXd force(3 * n), qdd(3 * n);
+    apply_actuation(arm, q, out.tau_actuation_nm, force);
+    EXPECT_EQ(force, VectorXd(out.tau_u_nm));
+    DynamicsWorkspace workspace(arm);
+    ASSERT_TRUE(forward_dynamics(arm, workspace, q, qd, force, qdd));
+    const Matrices m = matrices(arm, q, qd);
+    const VectorXd right = -(m.k + kp).cwiseProduct(qr - q) - (m.beta + kd).cwiseProduct(qrd - qd);
+    const VectorXd left = m.B * (qrdd - qdd) + m.C * (qrd - qd);
+    for (int i = 0; i < 3 * n; ++i)
+      EXPECT_NEAR(left[i], right[i], 1e-10 * (std::abs(right[i]) + (i % 3 == 2 ? 100.0 : 1.0)));
   }
 }
 

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <numbers>
 #include <random>
 
@@ -337,6 +338,70 @@ TEST(CurvatureFilter, StaysFinite) {
     if (motion.valid[0]) {
       ASSERT_NEAR(motion.u_rad[0], 1.0, 1e-4);
     }
+  }
+}
+
+/// An arm of one segment that stretches, and what a frame says of it.
+ArmParameters stretching_arm() {
+  ArmParameters arm;
+  arm.segments.resize(1);
+  arm.extensible = true;
+  return arm;
+}
+CurvatureEstimate stretched(double u, double elongation_m) {
+  CurvatureEstimate estimate = estimate_of(u);
+  estimate.length_m[0] = SegmentParameters{}.length_m + elongation_m;
+  estimate.length_variance_m2[0] = 1e-8;
+  return estimate;
+}
+
+// With numbers that u has too, e is bit for bit what u is: the same fit.
+TEST(CurvatureFilter, ElongationIsFittedAsUIs) {
+  CurvatureFilter filter(settings_of(), stretching_arm());
+  const double rest_m = SegmentParameters{}.length_m;
+  for (const double time : irregular_times(0.5, 4)) {
+    const double u = 0.4 * std::sin(4.0 * time);
+    // What the length at rest plus u rounds to.
+    const double e = (rest_m + u) - rest_m;
+    filter.update(to_ns(time), stretched(e, u));
+    FilteredMotion motion;
+    filter.predict(to_ns(time + 0.006), motion);
+    ASSERT_EQ(motion.u_rad.size(), 3);
+    EXPECT_DOUBLE_EQ(motion.u_rad[2], motion.u_rad[0]);
+    EXPECT_NEAR(motion.velocity_radps[2], motion.velocity_radps[0], 1e-12);
+  }
+}
+
+TEST(CurvatureFilter, AKnownElongationPassesExactly) {
+  CurvatureFilter filter(settings_of(1.0), stretching_arm());
+  KnownMotion known;
+  const auto at = [&](double t) -> const KnownMotion& {
+    known.u_rad = Eigen::Vector3d(0.1 * t, 0.0, 0.01 * std::sin(5.0 * t));
+    known.velocity_radps = Eigen::Vector3d(0.1, 0.0, 0.05 * std::cos(5.0 * t));
+    known.acceleration_radps2 = Eigen::Vector3d(0.0, 0.0, -0.25 * std::sin(5.0 * t));
+    known.source = 1;
+    return known;
+  };
+  FilteredMotion motion;
+  for (double t = 0.0; t < 1.0; t += 0.005) {
+    filter.update(to_ns(t), stretched(at(t).u_rad[0], at(t).u_rad[2]), &at(t));
+    filter.predict(to_ns(t + 0.004), motion, &at(t + 0.004));
+    EXPECT_NEAR(motion.u_rad[2], at(t + 0.004).u_rad[2], 1e-12);
+    EXPECT_NEAR(motion.velocity_radps[2], at(t + 0.004).velocity_radps[2], 1e-12);
+  }
+}
+
+TEST(CurvatureFilter, ALengthThatSaysNothingIsNoObservation) {
+  EstimationSettings settings = settings_of();
+  settings.predicted_frames = 1;
+  CurvatureFilter filter(settings, stretching_arm());
+  FilteredMotion motion;
+  for (int k = 1; k <= 5; ++k) {
+    CurvatureEstimate estimate = stretched(0.1, 0.01);
+    if (k > 2) estimate.length_variance_m2[0] = std::numeric_limits<double>::infinity();
+    filter.update(to_ns(0.005 * k), estimate);
+    filter.predict(to_ns(0.005 * k), motion);
+    EXPECT_EQ(motion.all_valid(), k <= 3) << k;
   }
 }
 

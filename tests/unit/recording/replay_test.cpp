@@ -76,6 +76,17 @@ TEST_F(LockStepReplay, ARunWithFaultsIsReproducedBitForBit) {
   EXPECT_EQ(summary.recorded_build, "this build");
 }
 
+TEST(Replay, AnArmThatStretchesIsReproducedBitForBit) {
+  const Experiment experiment = load_experiment(std::filesystem::path(SOFTARM_SOURCE_DIR) /
+                                                "config" / "paper_arm_stretching.yaml");
+  LogBytes log;
+  const test::RecordedRun run = test::record_run(experiment, 3.0, false, log);
+  EXPECT_GT(std::count(run.modes.begin(), run.modes.end(), Mode::active), 100);
+  const ReplaySummary summary = replay(log.bytes, experiment).summary;
+  EXPECT_TRUE(summary.complete());
+  EXPECT_EQ(summary.statuses.compared, run.ticks);
+}
+
 // The pipeline is a function of its inputs alone: not of what its memory held before, either.
 TEST_F(LockStepReplay, WhatMemoryHeldBeforeMakesNoDifference) {
   struct alignas(ControlPipeline) Storage {

@@ -53,6 +53,44 @@ TEST(ArmMessages, AStatusComesAsWhatItMeans) {
   EXPECT_EQ(status.pressure_bar[11], 802.75);
 }
 
+TEST(ArmMessages, ElongationsComeWhereSegmentsStretchAndOnlyOfAllSegments) {
+  auto message = example<controller_status_t>(3, 4);
+  ArmStatus status;
+  status.elongation_m = SegmentScalars::Constant(7, 9.0);  // of another arm, before
+  ASSERT_TRUE(decode(encoded(message), status));
+  EXPECT_EQ(status.elongation_m.size(), 0);
+  const auto stretching = [&](std::int16_t count) {
+    message.num_stretching = count;
+    const auto n = static_cast<std::size_t>(count);
+    message.elongation_m.assign(n, 0.25F);
+    message.elongation_rate_mps.assign(n, 0.5F);
+    message.reference_elongation_m.assign(n, 0.75F);
+    message.axial_force_n.assign(n, 32.0F);
+    return encoded(message);
+  };
+  ASSERT_TRUE(decode(stretching(3), status));
+  EXPECT_EQ(status.elongation_m, SegmentScalars::Constant(3, 0.25));
+  EXPECT_EQ(status.elongation_rate_mps[2], 0.5);
+  EXPECT_EQ(status.reference_elongation_m[0], 0.75);
+  EXPECT_EQ(status.axial_force_n[1], 32.0);
+  EXPECT_EQ(status.pressure_bar[11], 802.75);
+  for (const std::int16_t wrong : {1, 2, 4}) EXPECT_FALSE(decode(stretching(wrong), status));
+
+  auto truth = example<plant_state_t>(2, 4);
+  PlantState state;
+  ASSERT_TRUE(decode(encoded(truth), state));
+  EXPECT_EQ(state.elongation_m.size(), 0);
+  truth.num_stretching = 2;
+  truth.elongation_m = {0.01, 0.02};
+  truth.elongation_rate_mps = {0.1, 0.2};
+  ASSERT_TRUE(decode(encoded(truth), state));
+  EXPECT_EQ(state.elongation_m[1], 0.02);
+  EXPECT_EQ(state.elongation_rate_mps[0], 0.1);
+  truth.num_stretching = 1;
+  truth.elongation_m = truth.elongation_rate_mps = {0.0};
+  EXPECT_FALSE(decode(encoded(truth), state));
+}
+
 TEST(ArmMessages, EveryFlagIsItsOwn) {
   const std::pair<std::int16_t, bool ArmStatus::*> flags[] = {
       {controller_status_t::SATURATED, &ArmStatus::saturated},

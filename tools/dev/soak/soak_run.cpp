@@ -175,7 +175,7 @@ void SoakRun::cause(const SoakFault& fault) {
     case SoakAction::relay: {
       Fault chosen = *find_fault(fault.relay_fault);
       if (fault.amount > 0.0) chosen.amount = fault.amount;
-      const int segments = experiment_.arm.dof() / 2;
+      const int segments = experiment_.arm.size();
       chosen.body = std::uniform_int_distribution(1, segments)(random_);
       if (chosen.kind == FaultKind::burst) {
         arm_.wait_for([&] { return arm_.fullest_bar() > kBurstFrom_bar; }, kPatience_s);

@@ -1,0 +1,133 @@
+#include "softarm/runtime/elongation_reference.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "softarm/actuation/input_map.hpp"
+#include "softarm/model/statics.hpp"
+
+namespace softarm {
+
+namespace {
+
+/// N, of this pressure in all chambers of a segment.
+double axial_force_n(const ActuationSettings& actuation, std::size_t segment, double pressure_bar) {
+  return pressure_bar * axial_input_map(actuation.kind, actuation.segments[segment]).sum();
+}
+
+}  // namespace
+
+SegmentScalars straight_elongation(const ArmParameters& arm, const ActuationSettings& actuation,
+                                   double pressure_bar) {
+  const int n = arm.size();
+  SegmentScalars out = SegmentScalars::Zero(n);
+  DynamicsWorkspace workspace(arm);
+  Eigen::VectorXd gravity(arm.dof());
+  // Straight, e has no influence on the axial weight.
+  gravity_moments(arm, workspace, Eigen::VectorXd::Zero(arm.dof()), gravity);
+  for (int i = 0; i < n; ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    const SegmentParameters& segment = arm.segments[k];
+    if (segment.constant_length) continue;
+    if (!(segment.axial_stiffness_n_per_m > 0.0) || !(segment.axial_damping_ns_per_m > 0.0)) {
+      throw std::invalid_argument(fmt::format(
+          "arm: expected an axial stiffness and damping > 0 of segment {}, which stretches, got {} "
+          "and {}",
+          i + 1, segment.axial_stiffness_n_per_m, segment.axial_damping_ns_per_m));
+    }
+    const double force_n = axial_force_n(actuation, k, pressure_bar);
+    out[i] = (force_n - gravity[3 * i + 2]) / segment.axial_stiffness_n_per_m;
+  }
+  return out;
+}
+
+ElongationReference::ElongationReference(const ArmParameters& arm,
+                                         const ActuationSettings& actuation,
+                                         const PressureAllocator& allocator)
+    : arm_(arm), allocator_(allocator), workspace_(arm) {
+  for (SegmentScalars* v : {&e_, &rate_, &acceleration_, &force_, &force_before_, &force_after_})
+    v->setZero(arm.size());
+  tau_.setZero(arm.dof());
+  bias_n_.setZero(arm.size());
+  for (int i = 0; i < arm.size(); ++i)
+    bias_n_[i] = axial_force_n(actuation, static_cast<std::size_t>(i), actuation.bias_pressure_bar);
+}
+
+void ElongationReference::start(double time_s, ConstVectorRef q) noexcept {
+  time_s_ = time_s;
+  for (int i = 0; i < arm_.size(); ++i) e_[i] = q[3 * i + 2];
+  rate_.setZero();
+  acceleration_.setZero();
+}
+
+void ElongationReference::replace(double time_s, ReferenceSample& sample) const noexcept {
+  const double ahead = time_s - time_s_;
+  for (int i = 0; i < arm_.size(); ++i) {
+    sample.u[3 * i + 2] = e_[i] + ahead * (rate_[i] + 0.5 * ahead * acceleration_[i]);
+    sample.velocity[3 * i + 2] = rate_[i] + ahead * acceleration_[i];
+    sample.acceleration[3 * i + 2] = acceleration_[i];
+  }
+}
+
+// force_ = N - I of the sample.
+void ElongationReference::force_beside_spring(double time_s,
+                                              const ReferenceSample& sample) noexcept {
+  sample_.u = sample.u;
+  sample_.velocity = sample.velocity;
+  sample_.acceleration = sample.acceleration;
+  replace(time_s, sample_);
+  inverse_dynamics(arm_, workspace_, sample_.u, sample_.velocity, sample_.velocity,
+                   sample_.acceleration, {}, tau_);
+  for (int i = 0; i < arm_.size(); ++i) {
+    const SegmentParameters& segment = arm_.segments[static_cast<std::size_t>(i)];
+    const Eigen::Vector2d bend =
+        tau_.segment<2>(3 * i) + segment.stiffness_nm_per_rad * sample.u.segment<2>(3 * i) +
+        segment.damping_nms_per_rad * sample.velocity.segment<2>(3 * i);
+    const double beside_n = tau_[3 * i + 2];
+    const double wanted_n = beside_n + segment.axial_stiffness_n_per_m * sample.u[3 * i + 2] +
+                            segment.axial_damping_ns_per_m * sample.velocity[3 * i + 2];
+    // tau_A = A_chamber^-1 bend
+    force_[i] = allocator_.axial(i).within_reach({-bend.y(), bend.x()}, wanted_n) - beside_n;
+  }
+}
+
+void ElongationReference::hold_constant_lengths(SegmentVector& tau_actuation_nm) const noexcept {
+  for (int i = 0; i < arm_.size(); ++i)
+    if (arm_.segments[static_cast<std::size_t>(i)].constant_length)
+      tau_actuation_nm[3 * i + 2] = bias_n_[i];
+}
+
+void ElongationReference::advance(double time_s, double lookahead_s,
+                                  ReferenceWindow& window) noexcept {
+  const double passed_s = std::max(time_s - time_s_, 0.0);
+  const double after_s = time_s + lookahead_s, before_s = after_s - window.interval_s;
+  force_beside_spring(before_s, window.before);
+  force_before_ = force_;
+  force_beside_spring(after_s, window.after);
+  force_after_ = force_;
+  force_beside_spring(time_s, window.now);
+  for (int i = 0; i < arm_.size(); ++i) {
+    const SegmentParameters& segment = arm_.segments[static_cast<std::size_t>(i)];
+    if (segment.constant_length) continue;
+    const double stiffness = segment.axial_stiffness_n_per_m;
+    const double damping = segment.axial_damping_ns_per_m;
+    const double slope = (force_after_[i] - force_before_[i]) / window.interval_s;
+    // Exact for a force that rises evenly.
+    const double decay = std::exp(-passed_s * stiffness / damping);
+    const double lag_s = damping / stiffness;
+    const double now = (force_[i] - slope * lag_s) / stiffness;  // where the ramp's answer is
+    const double then = now - slope * passed_s / stiffness;      // and was
+    e_[i] = now + decay * (e_[i] - then);
+    rate_[i] = (force_[i] - stiffness * e_[i]) / damping;
+    acceleration_[i] = (slope - stiffness * rate_[i]) / damping;
+  }
+  time_s_ = time_s;
+  replace(before_s, window.before);
+  replace(time_s, window.now);
+  replace(after_s, window.after);
+}
+
+}  // namespace softarm
