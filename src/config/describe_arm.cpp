@@ -206,7 +206,52 @@ static void describe(Keys& key, RunSettings& it) {
   KEY(log_rate_hz, from(0, 1e4), "rows of log.csv, from which errors are taken; 0: every tick");
 }
 
-static void describe_identification(Keys& key, IdentificationSettings& it, MotionLimits& limits) {
+/// Terms that `softarm identify` writes for arms that lag, stretch and remember.
+static void describe_memory(Keys& key, IdentificationSettings& it, std::size_t chambers) {
+  const auto n = static_cast<std::size_t>(key.segments);
+  KEY(load_kg, from(0, 100), "a point mass at the tip, likewise");
+  KEY(inertia, "false: without it, for motion so slow that it does not count");
+  it.push_nm_per_bar.resize(2 * chambers, 0.0);
+  KEY(push_nm_per_bar, from(-1e4, 1e4).one_or_pairs(),
+      "of every chamber, generalized force in u, in any direction; 0: as actuation has it");
+  it.fill_lag_s.resize(chambers, 0.0);
+  it.vent_lag_s.resize(chambers, 0.0);
+  KEY(fill_lag_s, from(0, 100).one_or_each(), "of every chamber, where its pressure rises; 0: lag_s");
+  KEY(vent_lag_s, from(0, 100).one_or_each(), "the same where it falls");
+  it.saturation_1pbar.resize(chambers, 0.0);
+  KEY(saturation_1pbar, from(-100, 100).one_or_each(), "of every chamber, q: p counts as p (1 + q p)");
+  KEY(stiffening_1pbar, from(-100, 100), "s: k counts as k (1 + s sum of the segment's pressures)");
+  it.cross_nm_per_bar.resize(2 * n * chambers, 0.0);
+  KEY(cross_nm_per_bar, from(-1e4, 1e4).one_or_each(),
+      "of every chamber in turn, 2n numbers: force on all segments beside push_nm_per_bar");
+  KEY(slip_radius_rad, from(0, kTwoPi).list(), "hysteresis: bends at which springs slip");
+  KEY(slip_stiffness_nm_per_rad, from(0, 1e4).list(), "of these springs");
+  KEY(remanence, from(0, 1), "share of the bend by which the rest follows it");
+  KEY(remanence_s, above(0, 1e4), "time constant of that");
+  it.remanent_u_rad.resize(2 * n, 0.0);
+  KEY(remanent_u_rad, from(-kTwoPi, kTwoPi).one_or_pairs(), "where the rest is at first, for that");
+}
+
+static void describe_stretch(Keys& key, IdentificationSettings& it, std::size_t chambers) {
+  const auto n = static_cast<std::size_t>(key.segments);
+  it.stretch_m_per_bar.resize(n * chambers, 0.0);
+  KEY(stretch_m_per_bar, from(-10, 10).one_or_each(),
+      "of every chamber in turn, n numbers: by what it lengthens the segments; all 0: not known");
+  it.stretch_length_m.resize(n, 0.0);
+  KEY(stretch_length_m, from(0, 1e3).one_or_each(), "of the segments without pressure, for that");
+  it.stretch_fill_s.resize(chambers, 0.0);
+  it.stretch_vent_s.resize(chambers, 0.0);
+  KEY(stretch_fill_s, from(0, 100).one_or_each(), "lag of every chamber's stretch as it rises");
+  KEY(stretch_vent_s, from(0, 100).one_or_each(), "and as it falls");
+  it.stretch_saturation_1pbar.resize(chambers, 0.0);
+  KEY(stretch_saturation_1pbar, from(-100, 100).one_or_each(), "as saturation_1pbar");
+  KEY(stretch_friction_m, from(0, 1), "half width of a play between pressure and length");
+  KEY(stretch_remanence, from(0, 10), "as remanence");
+  KEY(stretch_remanence_s, above(0, 1e4), "as remanence_s");
+}
+
+static void describe_identification(Keys& key, IdentificationSettings& it, MotionLimits& limits,
+                                    std::size_t chambers) {
   it.rest_u_rad.resize(static_cast<std::size_t>(2 * key.segments), 0.0);
   KEY(steps_bar, above(0, 100).list(), "pressures of the steps, on every side in turn");
   KEY(hold_s, from(0.1, 100), "from step to step");
@@ -219,6 +264,8 @@ static void describe_identification(Keys& key, IdentificationSettings& it, Motio
   KEY(cubic_nm_per_rad3, from(-1e4, 1e4), "likewise: adds c |u - rest|^2 (u - rest) to K u");
   KEY(lag_s, from(0, 100), "first order, from set point to pressure, likewise");
   key("delay_s", it.dead_time_s, from(-1, 100), "from set point to frame, likewise");
+  describe_memory(key, it, chambers);
+  describe_stretch(key, it, chambers);
 }
 
 static void describe_uncertainty(Keys& key, Experiment& experiment) {
@@ -260,7 +307,10 @@ void describe(Keys& key, Experiment& it) {
               [&] { describe_plant(key, it); });
   KEY(run, "defaults of a simulated run");
   key.section({"identification", "the steps and the findings of `softarm identify`"},
-              [&] { describe_identification(key, it.identification, it.motion_limits); });
+              [&] {
+                describe_identification(key, it.identification, it.motion_limits,
+                                        static_cast<std::size_t>(chamber_count(it.actuation)));
+              });
 }
 
 }  // namespace softarm

@@ -56,7 +56,8 @@ bool same_poses(const CsvTable& table, const RecordingMap& map, std::size_t a, s
 
 class Importer {
  public:
-  explicit Importer(const MappedTable& recording)
+  /// @param frames  null: those of the recording's own rest window, if it has one
+  Importer(const MappedTable& recording, const MarkerFrames* frames)
       : files_(recording.files),
         map_(recording.map),
         table_(recording.table),
@@ -65,8 +66,14 @@ class Importer {
     check_times();
     check_pressures(map_.commanded);
     check_pressures(map_.measured);
-    if (map_.rest) learn_rest();
+    if (frames != nullptr) {
+      use(*frames);
+    } else if (map_.rest) {
+      learn_rest();
+    }
   }
+
+  MarkerFrames frames() const { return frames_; }
 
   ImportSummary write(const std::filesystem::path& out) {
     EventLogWriter log(out, files_, OutputFile::Kind::document);
@@ -176,8 +183,19 @@ class Importer {
     arm.base_rotation = map_.base_rotation;
     for (std::size_t i = 1; i < map_.bodies.size(); ++i)
       arm.segments.push_back({.length_m = map_.bodies[i].length_m});
-    const auto frames = frames_on_bodies(arm, Eigen::VectorXd::Zero(arm.dof()), mean);
-    for (std::size_t i = 0; i < frames.size(); ++i) convention_[i] = convention(frames[i]);
+    use({frames_on_bodies(arm, Eigen::VectorXd::Zero(arm.dof()), mean), summary_.rest_frames,
+         summary_.rest_spread_m});
+  }
+
+  void use(const MarkerFrames& frames) {
+    if (frames.on_body.size() != map_.bodies.size())
+      throw std::runtime_error(fmt::format("frames of {} bodies: expected those of {}",
+                                           frames.on_body.size(), map_.bodies.size()));
+    frames_ = frames;
+    summary_.rest_frames = frames.rest_frames;
+    summary_.rest_spread_m = frames.rest_spread_m;
+    for (std::size_t i = 0; i < convention_.size(); ++i)
+      convention_[i] = convention(frames.on_body[i]);
   }
 
   Eigen::Isometry3d mean_pose(std::size_t body, const std::vector<std::size_t>& rows) {
@@ -284,6 +302,7 @@ class Importer {
   const RecordingMap& map_;
   CsvTable table_;                          ///< a copy: rows may go, pressures may be held
   std::vector<PoseConvention> convention_;  // of every body, to the segment frame it carries
+  MarkerFrames frames_;
   ImportSummary summary_;
   softarm_messages::mocap_frame_t frame_{};
   std::size_t frame_row_ = 0;
@@ -293,7 +312,19 @@ class Importer {
 }  // namespace
 
 ImportSummary import_recording(const MappedTable& recording, const std::filesystem::path& out) {
-  return Importer(recording).write(out);
+  return Importer(recording, nullptr).write(out);
+}
+
+MarkerFrames marker_frames(const MappedTable& recording) {
+  if (!recording.map.rest)
+    throw std::runtime_error(
+        fmt::format("{}: expected a map with a rest window", recording.table.file));
+  return Importer(recording, nullptr).frames();
+}
+
+ImportSummary import_recording(const MappedTable& recording, const MarkerFrames& frames,
+                               const std::filesystem::path& out) {
+  return Importer(recording, &frames).write(out);
 }
 
 }  // namespace softarm

@@ -17,6 +17,9 @@ void add_bench_control_commands(CLI::App& group);
 /// `softarm-dev bench`
 void add_bench_robustness_command(CLI::App& group);
 
+/// softarm-dev bench recordings DATA [--json] [--only TEXT]: added to `softarm-dev bench`
+void add_bench_recordings_command(CLI::App& group);
+
 /// softarm-dev bench plant [--json] [--duration S] [--rounds N]: added to `softarm-dev bench`
 void add_bench_plant_command(CLI::App& group);
 

@@ -1,8 +1,10 @@
 // Converts a table of recorded poses and pressures to a log of our messages.
 #pragma once
 
+#include <Eigen/Geometry>
 #include <cstdint>
 #include <filesystem>
+#include <vector>
 
 #include "softarm/recording/recording_map.hpp"
 
@@ -28,5 +30,23 @@ struct ImportSummary {
 /// row.
 /// @throws std::runtime_error for inconsistent data, or if the log cannot be written
 ImportSummary import_recording(const MappedTable& recording, const std::filesystem::path& out);
+
+/// Where the segment frames S_0 .. S_n sit on the bodies that carry them, as found in one recording
+/// and used for others of the same arm, which then share its zero. An arm that was just used hangs
+/// bent: a rest window in each recording would make each bend another zero.
+struct MarkerFrames {
+  std::vector<Eigen::Isometry3d> on_body;  ///< B_i^-1 S_i, the base first
+  std::int64_t rest_frames = 0;            ///< they were found from
+  double rest_spread_m = 0.0;              ///< largest distance of a body at rest from its mean
+};
+
+/// Those of the rest window of a recording.
+/// @throws std::runtime_error for inconsistent data, or where the map has no rest window
+MarkerFrames marker_frames(const MappedTable& recording);
+
+/// As above, with these frames instead of those of the recording's rest window.
+/// @throws std::runtime_error also where the number of bodies differs
+ImportSummary import_recording(const MappedTable& recording, const MarkerFrames& frames,
+                               const std::filesystem::path& out);
 
 }  // namespace softarm

@@ -8,9 +8,19 @@ namespace softarm {
 namespace {
 
 void add_source_options(CLI::App& command, IdentifyCommand& options) {
-  auto* log = command.add_option(
-      "--log", options.log,
-      "identify from this LCM log (softarm import, lcm-logger) instead of steps");
+  auto* log =
+      command
+          .add_option("--log", options.logs,
+                      "identify from this LCM log (softarm import, lcm-logger) instead of steps; "
+                      "given several times: from all, which must share one zero (softarm import "
+                      "--frames-from)")
+          ->allow_extra_args(false);
+  command
+      .add_option("--held-out", options.held_out,
+                  "a further log, never identified from: how well it is predicted, and, with "
+                  "--choose-terms and --compare, what terms are judged by")
+      ->allow_extra_args(false)
+      ->needs(log);
   command
       .add_flag("--live", options.live,
                 "play the steps over LCM on the running plant or hardware, within the limits of "
@@ -56,6 +66,18 @@ void add_choice_options(CLI::App& command, IdentifyCommand& options) {
   command.add_flag("--cubic", options.choice.cubic, "fit a cubic stiffness");
   command.add_flag("--directions", options.choice.directions,
                    "fit the direction in which every chamber bends its segment");
+  command.add_flag("--venting", options.choice.venting,
+                   "fit one lag for filling and one for venting");
+  command.add_flag("--chamber-lags", options.choice.chamber_lags, "the same of every chamber");
+  command.add_flag("--saturation", options.choice.saturation,
+                   "fit how every chamber's push bends off with pressure");
+  command.add_flag("--hysteresis", options.choice.hysteresis, "fit springs that slip");
+  command.add_flag("--remanence", options.choice.remanence, "fit a rest that follows the bend");
+  command.add_flag("--stiffening", options.choice.stiffening, "fit a stiffness that pressures add");
+  command.add_flag("--cross", options.choice.cross, "fit forces of chambers on other segments");
+  command.add_flag("--mass", options.choice.mass, "fit one factor on all masses");
+  command.add_flag("--load", options.choice.load, "fit a point mass at the tip");
+  command.add_flag("--length", options.choice.length, "fit one factor on all lengths");
   command
       .add_option("--prior", options.options.refinement.prior,
                   "how far, in parts of it, every number may be off what is configured (one "
@@ -79,6 +101,11 @@ void add_identify_options(CLI::App& command, IdentifyCommand& options) {
                    "identify nothing, but print how well CONFIG predicts the motion");
   command.add_flag("--compare", options.compare,
                    "what each further term gains, on the whole record and from half to half");
+  command.add_flag("--choose-terms", options.choose,
+                   "add terms as long as they predict better what was not seen: the other half of "
+                   "one log, each of several logs by the others, or --held-out");
+  command.add_flag("--stretch", options.stretch,
+                   "identify how the segments stretch, too, in the same way");
   command.add_option("--hold", options.plan.hold_s, "time between steps in s")
       ->check(number_between(0.1, 100.0));
   command

@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "softarm/commissioning/identification/coverage.hpp"
 #include "softarm/commissioning/identification/fit_report.hpp"
@@ -13,7 +14,8 @@
 namespace softarm {
 
 struct IdentifyCommand {
-  std::string config, output, log, out;
+  std::string config, output, out;
+  std::vector<std::string> logs, held_out;  ///< to identify from, and to judge by
   std::string damage;  ///< of the log, found while it is read
   LoggedInput input = LoggedInput::commanded;
   FitChoice choice;
@@ -25,6 +27,7 @@ struct IdentifyCommand {
   bool has_seed = false, has_hold = false, no_lag = false, no_delay = false;
   bool no_stiffness = false, no_damping = false, no_inertia = false;
   bool linear = false, predict = false, compare = false, coverage = false, live = false;
+  bool choose = false, stretch = false;
 };
 
 /// Adds every option of `softarm identify` to the sub-command; they are stored in `options` when

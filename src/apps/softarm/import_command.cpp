@@ -11,7 +11,7 @@ namespace softarm {
 namespace {
 
 struct ImportOptions {
-  std::string table, map, out;
+  std::string table, map, out, frames_from, frames_map;
 };
 
 void run_import(const ImportOptions& options) {
@@ -20,14 +20,22 @@ void run_import(const ImportOptions& options) {
     return;
   }
   const MappedTable recording = read_mapped_table(options.table, options.map);
-  const ImportSummary summary = import_recording(recording, options.out);
+  const bool shared = !options.frames_from.empty();
+  const ImportSummary summary =
+      shared ? import_recording(recording,
+                                marker_frames(read_mapped_table(
+                                    options.frames_from, options.frames_map.empty()
+                                                             ? options.map
+                                                             : options.frames_map)),
+                                options.out)
+             : import_recording(recording, options.out);
   fmt::print("{} rows over {:.3f} s: {} frames, {} repeated, {} missing, {} with a body not seen\n",
              summary.rows, summary.duration_s, summary.frames, summary.repeated, summary.missing,
              summary.unseen);
   fmt::print("longest gap between frames {:.3f} s\n", summary.longest_gap_s);
-  if (recording.map.rest) {
-    fmt::print("rest pose from {} frames, still within {:.2f} mm\n", summary.rest_frames,
-               1e3 * summary.rest_spread_m);
+  if (recording.map.rest || shared) {
+    fmt::print("rest pose from {} frames{}, still within {:.2f} mm\n", summary.rest_frames,
+               shared ? " of " + options.frames_from : "", 1e3 * summary.rest_spread_m);
   }
   fmt::print("{}\n", options.out);
 }
@@ -43,6 +51,12 @@ void add_import_command(CLI::App& app) {
                                   "reason of every line");
   auto* out = command->add_option("--out", options->out, "the log to write")->needs(map);
   map->needs(out);
+  auto* from = command
+                   ->add_option("--frames-from", options->frames_from,
+                                "another table of this arm: its rest window is the zero of both")
+                   ->needs(map);
+  command->add_option("--frames-map", options->frames_map, "the map of that table (default: MAP)")
+      ->needs(from);
   command->callback([options] { run_import(*options); });
 }
 

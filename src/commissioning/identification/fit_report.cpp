@@ -64,6 +64,90 @@ std::string chambers_yaml(const ArmHypothesis& arm, const ActuationSettings& act
   return text;
 }
 
+/// Whether an experiment with these chambers loads: in every segment neighbours push less than half a
+/// turn apart.
+bool reaches_every_direction(const ArmHypothesis& arm) {
+  constexpr double kLeastGain = 0.02;  ///< of the largest: less pushes nowhere
+  for (int i = 0; i < arm.arm.size(); ++i) {
+    std::vector<double> angles;
+    double largest = 0.0;
+    for (std::size_t j = 0; j < arm.segment_of.size(); ++j)
+      if (arm.segment_of[j] == i)
+        largest = std::max(largest, arm.input_map.col(static_cast<Eigen::Index>(j)).norm());
+    for (std::size_t j = 0; j < arm.segment_of.size(); ++j) {
+      const Eigen::Vector2d push = arm.input_map.col(static_cast<Eigen::Index>(j));
+      if (arm.segment_of[j] != i) continue;
+      if (push.norm() < kLeastGain * largest) return false;
+      angles.push_back(std::atan2(push.y(), push.x()));
+    }
+    std::sort(angles.begin(), angles.end());
+    double widest = angles.empty() ? 2.0 * std::numbers::pi
+                                   : angles.front() + 2.0 * std::numbers::pi - angles.back();
+    for (std::size_t k = 1; k < angles.size(); ++k)
+      widest = std::max(widest, angles[k] - angles[k - 1]);
+    if (widest > 0.95 * std::numbers::pi) return false;
+  }
+  return true;
+}
+
+/// "  name: [a, b]\n", nothing where all are `off`.
+std::string row(const char* name, const Eigen::VectorXd& values, double off = 0.0) {
+  if (values.size() == 0 || (values.array() == off).all()) return "";
+  return fmt::format("  {}: {}\n", name,
+                     list(static_cast<int>(values.size()), [&](int i) { return values[i]; }));
+}
+std::string row(const char* name, double value, double off = 0.0) {
+  return value == off ? "" : fmt::format("  {}: {:.7g}\n", name, value);
+}
+std::string pairs(const char* name, const Eigen::VectorXd& values) {
+  if (values.size() == 0 || values.isZero(0.0)) return "";
+  std::string text;
+  for (Eigen::Index i = 0; i < values.size(); i += 2)
+    text += fmt::format("{}[{:.7g}, {:.7g}]", i > 0 ? ", " : "", values[i], values[i + 1]);
+  return fmt::format("  {}: [{}]\n", name, text);
+}
+
+Eigen::VectorXd times(const std::vector<FillVentLag>& lags, double FillVentLag::*member) {
+  Eigen::VectorXd out(static_cast<Eigen::Index>(lags.size()));
+  for (std::size_t j = 0; j < lags.size(); ++j) out[static_cast<Eigen::Index>(j)] = lags[j].*member;
+  return out;
+}
+
+/// The keys of `identification` beyond lag, delay, cubic stiffness and rest; what is off is left out.
+std::string memory_yaml(const ArmHypothesis& arm, bool directions) {
+  std::string text = row("load_kg", arm.load_kg);
+  if (!arm.inertia) text += "  inertia: false\n";
+  if (directions) text += pairs("push_nm_per_bar", arm.input_map.reshaped());
+  text += row("fill_lag_s", times(arm.lags, &FillVentLag::fill_s));
+  text += row("vent_lag_s", times(arm.lags, &FillVentLag::vent_s));
+  text += row("saturation_1pbar", arm.saturation_1pbar);
+  text += row("stiffening_1pbar", arm.stiffening_1pbar);
+  text += row("cross_nm_per_bar", arm.cross_nm_per_bar.reshaped());
+  Eigen::VectorXd radii(static_cast<Eigen::Index>(arm.slip_springs.size())), stiffness = radii;
+  for (std::size_t k = 0; k < arm.slip_springs.size(); ++k) {
+    radii[static_cast<Eigen::Index>(k)] = arm.slip_springs[k].radius_rad;
+    stiffness[static_cast<Eigen::Index>(k)] = arm.slip_springs[k].stiffness_nm_per_rad;
+  }
+  if (stiffness.size() > 0 && !stiffness.isZero(0.0))
+    text += row("slip_radius_rad", radii) + row("slip_stiffness_nm_per_rad", stiffness);
+  if (arm.remanence.share != 0.0) {
+    text += row("remanence", arm.remanence.share) + row("remanence_s", arm.remanence.time_s);
+    text += pairs("remanent_u_rad", arm.remanent_rad);
+  }
+  const ElongationHypothesis& it = arm.elongation;
+  if (!it.given()) return text;
+  text += row("stretch_m_per_bar", it.gain_m_per_bar.reshaped());
+  text += row("stretch_length_m", it.offset_m);
+  text += row("stretch_fill_s", times(it.lags, &FillVentLag::fill_s));
+  text += row("stretch_vent_s", times(it.lags, &FillVentLag::vent_s));
+  text += row("stretch_saturation_1pbar", it.saturation_1pbar);
+  text += row("stretch_friction_m", it.friction_m);
+  if (it.remanence.share != 0.0)
+    text += row("stretch_remanence", it.remanence.share) +
+            row("stretch_remanence_s", it.remanence.time_s);
+  return text;
+}
+
 std::string segments_yaml(const ArmParameters& arm, const char* indent) {
   const auto of = [&](double SegmentParameters::*member) {
     return list(arm.size(),
@@ -139,7 +223,21 @@ std::string identified_yaml(const Experiment& experiment, const ArmHypothesis& a
   std::string text = fmt::format("# {}\ninclude: {}\n\narm:\n{}", note,
                                  fs::proximate(fs::absolute(config), folder).string(),
                                  segments_yaml(arm.arm, "  "));
-  if (chambers)
+  std::string plant_too;
+  const auto factor = [&](const char* key, double SegmentParameters::*member) {
+    if (arm.arm.segments[0].*member == experiment.arm.segments[0].*member) return;
+    const auto of = [&](const ArmParameters& it) {
+      return list(it.size(),
+                  [&](int i) { return it.segments[static_cast<std::size_t>(i)].*member; });
+    };
+    text += fmt::format("  {}: {}\n", key, of(arm.arm));
+    plant_too += fmt::format("    {}: {}\n", key, of(experiment.plant.arm));
+  };
+  factor("mass_kg", &SegmentParameters::mass_kg);
+  factor("length_m", &SegmentParameters::length_m);
+  // Chambers that cannot bend the arm to every side, as one identified from few motions, are no
+  // actuation of a controller; they predict by `push_nm_per_bar`.
+  if (chambers && (!choice.directions || reaches_every_direction(arm)))
     text += "\nactuation:\n  chambers:\n" + chambers_yaml(arm, experiment.actuation, "  ");
   text += fmt::format(
       "\nidentification:\n  lag_s: {:.6g}\n  delay_s: {:.6g}\n  cubic_nm_per_rad3: {:.6g}\n"
@@ -148,12 +246,12 @@ std::string identified_yaml(const Experiment& experiment, const ArmHypothesis& a
   for (Eigen::Index i = 0; i < arm.arm.size(); ++i)
     text += fmt::format("{}[{:.6g}, {:.6g}]", i > 0 ? ", " : "", arm.rest_rad[2 * i],
                         arm.rest_rad[2 * i + 1]);
-  text += "]\n";
+  text += "]\n" + memory_yaml(arm, choice.directions);
   // The controller inverts the lag on what depends on the reference alone.
-  if (choice.lag && arm.lag_s <= 5.0)
+  if (choice.lag && arm.lags.empty() && arm.lag_s <= 5.0)
     text += fmt::format("\ncontrol:\n  valve_lag_s: {:.6g}\n", arm.lag_s);
   text += "\n# The simulated arm is what it was.\nplant:\n  arm:\n" +
-          segments_yaml(experiment.plant.arm, "    ");
+          segments_yaml(experiment.plant.arm, "    ") + plant_too;
   if (chambers)
     text += "  actuation:\n    chambers:\n" +
             chambers_yaml(of_plant(experiment), experiment.plant.actuation, "    ");

@@ -76,7 +76,7 @@ double typical_period_s(const MotionRecord& record) {
   return median(std::move(gaps));
 }
 
-SmoothMotion smooth(const MotionRecord& record, double window_s, double lag_s, double dead_time_s) {
+SmoothMotion smooth(const MotionRecord& record, double window_s, const ArmHypothesis& arm) {
   if (record.time_s.size() < 8)
     throw std::runtime_error(fmt::format("a record of {} frames is too short: expected at least 8",
                                          record.time_s.size()));
@@ -91,7 +91,7 @@ SmoothMotion smooth(const MotionRecord& record, double window_s, double lag_s, d
   const Eigen::MatrixXd u = evenly(record, period_s, count, apart_s);
   const double longest_s = std::max(window_s, kMostPeriods * period_s);
   Eigen::MatrixXd input(count, record.input.value.cols());
-  LaggedInput lagged(record.input, lag_s, dead_time_s);
+  LaggedInput lagged(record.input, arm.input_lags(), arm.dead_time_s);
   Eigen::VectorXd p(input.cols());
   for (Eigen::Index k = 0; k < count; ++k) {
     lagged.at(record.time_s[0] + static_cast<double>(k) * period_s, p);
@@ -136,7 +136,7 @@ Eigen::VectorXd leftover(const ArmHypothesis& arm, const SmoothMotion& motion) {
 LinearFit fit_linear(const ParameterSet& set, const MotionRecord& record,
                      const Eigen::VectorXd& start, double window_s) {
   ArmHypothesis arm = set.arm(start);
-  const SmoothMotion motion = smooth(record, window_s, arm.lag_s, arm.dead_time_s);
+  const SmoothMotion motion = smooth(record, window_s, arm);
   const Eigen::VectorXd before = leftover(arm, motion);
   if (before.size() < 4 * set.size())
     throw std::runtime_error(

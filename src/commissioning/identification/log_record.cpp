@@ -143,7 +143,11 @@ class LogReader {
           inputs_.time_s.size(), wrong_size_));
     MotionRecord out;
     out.time_s = frames_.times().array() - frames_.time_s.front();
-    out.u_rad = frames_.rows(2 * experiment_.arm.size());
+    const Eigen::Index n = experiment_.arm.size();
+    const Eigen::MatrixXd rows = frames_.rows(5 * n);
+    out.u_rad = rows.leftCols(2 * n);
+    out.chord_m = rows.rightCols(3 * n);
+    out.noise_rad = std::sqrt(variance_rad2_ / static_cast<double>(frames_.time_s.size() * static_cast<std::size_t>(n)));
     out.input.time_s = inputs_.times().array() - frames_.time_s.front();
     out.input.value = inputs_.rows(static_cast<Eigen::Index>(chambers_));
     out.input.held = input_ == LoggedInput::commanded;
@@ -169,9 +173,19 @@ class LogReader {
     if (!std::all_of(estimate_.valid.begin(), estimate_.valid.begin() + experiment_.arm.size(),
                      [](bool each) { return each; }))
       return;
-    const Eigen::VectorXd u = estimate_.u_rad;
-    if (!u.allFinite()) return;
-    frames_.add(time_s(frame_.capture_ns), u.data(), static_cast<std::size_t>(u.size()));
+    const Eigen::Index n = experiment_.arm.size();
+    Eigen::VectorXd row(5 * n);
+    row.head(2 * n) = estimate_.u_rad;
+    for (Eigen::Index i = 0; i < n; ++i) {
+      const BodyPose& upper = frame_.body[static_cast<std::size_t>(i)];
+      const BodyPose& lower = frame_.body[static_cast<std::size_t>(i) + 1];
+      row.segment<3>(2 * n + 3 * i) =
+          upper.orientation.conjugate() * (lower.position_m - upper.position_m);
+    }
+    if (!row.allFinite()) return;
+    for (Eigen::Index i = 0; i < n; ++i)
+      variance_rad2_ += estimate_.variance_rad2[static_cast<std::size_t>(i)];
+    frames_.add(time_s(frame_.capture_ns), row.data(), static_cast<std::size_t>(row.size()));
   }
 
   template <class Message>
@@ -199,6 +213,7 @@ class LogReader {
   std::int64_t start_us_ = -1;
   std::int64_t last_frame_ = kNever;
   std::int64_t wrong_size_ = 0, malformed_ = 0;
+  double variance_rad2_ = 0.0;  ///< of u, summed over segments and frames
   MocapFrame frame_;
   CurvatureEstimate estimate_;
   softarm_messages::pressure_command_t command_message_;

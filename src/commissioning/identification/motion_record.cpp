@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 namespace softarm {
@@ -13,7 +14,9 @@ MotionRecord MotionRecord::part(double from_s, double to_s, double lead_s) const
   MotionRecord out;
   out.time_s = time_s.segment(first, std::max<Eigen::Index>(0, last - first));
   out.u_rad = u_rad.middleRows(first, out.time_s.size());
+  if (chord_m.rows() > 0) out.chord_m = chord_m.middleRows(first, out.time_s.size());
   out.input = input;
+  out.noise_rad = noise_rad;
   out.scored_from_s = std::max(scored_from_s, from_s);
   return out;
 }
@@ -25,12 +28,31 @@ MotionRecord MotionRecord::thinned(double apart_s) const {
   MotionRecord out = *this;
   out.time_s = time_s(kept).eval();
   out.u_rad = u_rad(kept, Eigen::all).eval();
+  if (chord_m.rows() > 0) out.chord_m = chord_m(kept, Eigen::all).eval();
+  return out;
+}
+
+Eigen::MatrixXd chord_lengths_m(const MotionRecord& record) {
+  Eigen::MatrixXd out(record.chord_m.rows(), record.chord_m.cols() / 3);
+  for (Eigen::Index k = 0; k < out.rows(); ++k)
+    for (Eigen::Index i = 0; i < out.cols(); ++i) {
+      const Eigen::Vector3d t = record.chord_m.row(k).segment<3>(3 * i);
+      const double across = std::hypot(t.x(), t.y());
+      out(k, i) = t.norm();
+      if (across > 0.0) out(k, i) *= t.norm() * std::atan2(across, t.z()) / across;
+    }
   return out;
 }
 
 LaggedInput::LaggedInput(const InputTrack& track, double lag_s, double dead_time_s)
+    : LaggedInput(track,
+                  std::vector<FillVentLag>(static_cast<std::size_t>(track.value.cols()),
+                                           FillVentLag{lag_s, lag_s}),
+                  dead_time_s) {}
+
+LaggedInput::LaggedInput(const InputTrack& track, std::vector<FillVentLag> lags, double dead_time_s)
     : track_(track),
-      lag_s_(lag_s),
+      lags_(std::move(lags)),
       dead_time_s_(dead_time_s),
       now_s_(track.time_s[0]),
       state_(track.value.row(0)) {}
@@ -39,18 +61,27 @@ void LaggedInput::advance(double t_s) {
   const bool last = index_ + 1 >= track_.time_s.size();
   const double step_s = t_s - now_s_;
   now_s_ = t_s;
-  if (step_s <= 0.0 || !(lag_s_ > 0.0)) return;
-  const double left = std::exp(-step_s / lag_s_);
-  if (track_.held || last) {
-    state_ += (1.0 - left) * (track_.value.row(index_).transpose() - state_);
-    return;
+  if (step_s <= 0.0) return;
+  const bool held = track_.held || last;
+  const double span_s = held ? 1.0 : track_.time_s[index_ + 1] - track_.time_s[index_];
+  const double into_s = t_s - track_.time_s[index_];
+  for (Eigen::Index j = 0; j < state_.size(); ++j) {
+    const FillVentLag& lag = lags_[static_cast<std::size_t>(j)];
+    const double from = track_.value(index_, j);
+    if (held) {
+      state_[j] = lag.step(state_[j], from, step_s);
+      continue;
+    }
+    const double slope = (track_.value(index_ + 1, j) - from) / span_s;
+    const double to = from + into_s * slope;
+    const double lag_s = lag.time_s(to - 0.5 * step_s * slope, state_[j]);
+    if (!(lag_s > 0.0)) {
+      state_[j] = to;
+      continue;
+    }
+    const double end = to - lag_s * slope;  // behind a ramp by its lag
+    state_[j] = end + std::exp(-step_s / lag_s) * (state_[j] - (end - step_s * slope));
   }
-  const double span_s = track_.time_s[index_ + 1] - track_.time_s[index_];
-  const Eigen::VectorXd slope =
-      (track_.value.row(index_ + 1) - track_.value.row(index_)).transpose() / span_s;
-  const Eigen::VectorXd end =
-      track_.value.row(index_).transpose() + (t_s - track_.time_s[index_]) * slope - lag_s_ * slope;
-  state_ = end + left * (state_ - (end - step_s * slope));
 }
 
 void LaggedInput::at(double t_s, Eigen::Ref<Eigen::VectorXd> out, bool before) {
@@ -62,16 +93,18 @@ void LaggedInput::at(double t_s, Eigen::Ref<Eigen::VectorXd> out, bool before) {
     ++index_;
   }
   if (t > now_s_) advance(t);
-  if (lag_s_ > 0.0) {
-    out = state_;
-    return;
-  }
-  out = track_.value.row(index_);
-  if (t < track_.time_s[0] || index_ + 1 >= count) return;
-  if (!track_.held) {
-    const double x =
-        (t - track_.time_s[index_]) / (track_.time_s[index_ + 1] - track_.time_s[index_]);
-    out += x * (track_.value.row(index_ + 1) - track_.value.row(index_)).transpose();
+  const bool line = !track_.held && t >= track_.time_s[0] && index_ + 1 < count;
+  const double x =
+      line ? (t - track_.time_s[index_]) / (track_.time_s[index_ + 1] - track_.time_s[index_])
+           : 0.0;
+  for (Eigen::Index j = 0; j < out.size(); ++j) {
+    const FillVentLag& lag = lags_[static_cast<std::size_t>(j)];
+    if (lag.fill_s > 0.0 || lag.vent_s > 0.0) {
+      out[j] = state_[j];
+      continue;
+    }
+    out[j] = track_.value(index_, j);
+    if (line) out[j] += x * (track_.value(index_ + 1, j) - track_.value(index_, j));
   }
 }
 

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <limits>
 #include <stdexcept>
+#include <vector>
 
 #include "commissioning/identification/parallel.hpp"
 #include "commissioning/identification/serial_correlation.hpp"
@@ -18,28 +19,33 @@ namespace {
 constexpr double kHeldAbove = 1.0;  ///< standard error of a combination that is not determined
 constexpr double kNoiseFloor_rad = 1e-9;  ///< no motion capture is better
 constexpr int kWeightings = 3;
-constexpr double kSame = 1e-4;         ///< squared standard errors: a hundredth of one
 constexpr double kStillStable = 0.75;  ///< of the longest step, which is short of the stable one
 constexpr double kNear = 0.02;         ///< sensitivities of a point so near serve for intervals
 
-/// Frames as columns: all components of a frame stand together.
+/// Frames as columns: all components of a frame stand together, records one behind the other.
 class Comparison {
  public:
-  Comparison(const ParameterSet& set, const MotionRecord& record)
-      : set_(set), record_(record), model_(record) {
-    first_ = std::lower_bound(record.time_s.begin(), record.time_s.end(), record.scored_from_s) -
-             record.time_s.begin();
-    if (record.time_s.size() - first_ < 8)
-      throw std::runtime_error(
-          fmt::format("{} frames to compare are too few: expected at least 8",
-                      std::max<Eigen::Index>(0, record.time_s.size() - first_)));
+  Comparison(const ParameterSet& set, std::span<const MotionRecord> records)
+      : set_(set), records_(records) {
+    for (const MotionRecord& record : records) {
+      models_.emplace_back(record);
+      firsts_.push_back(
+          std::lower_bound(record.time_s.begin(), record.time_s.end(), record.scored_from_s) -
+          record.time_s.begin());
+      const Eigen::Index frames = record.time_s.size() - firsts_.back();
+      if (frames < 8)
+        throw std::runtime_error(
+            fmt::format("{} frames to compare are too few: expected at least 8",
+                        std::max<Eigen::Index>(0, frames)));
+      frames_ += frames;
+    }
   }
 
   /// The response at `x`, and the step that it took: the longest that is stable straight and at
   /// rest, or, as a bent arm may be faster, a half, a fourth or an eighth of that.
   /// @throws std::runtime_error where none of them gives a bounded response
   double response(const Eigen::VectorXd& x, Eigen::MatrixXd& u) const {
-    const double longest_s = model_.longest_step_s(set_.arm(x));
+    const double longest_s = models_[0].longest_step_s(set_.arm(x));
     for (const double part : {1.0, 0.5, 0.25, 0.125})
       if (simulate(x, part * longest_s, u)) return part * longest_s;
     throw std::runtime_error(
@@ -51,16 +57,27 @@ class Comparison {
   /// smooth function of x. Zero where there is none.
   double stable_step_s(const Eigen::VectorXd& x, double step_s) const {
     if (!set_.possible(x)) return 0.0;
-    const double longest_s = model_.step_s(set_.arm(x)).value_or(0.0);
+    const double longest_s = models_[0].step_s(set_.arm(x)).value_or(0.0);
     return longest_s < kStillStable * step_s ? kStillStable * longest_s : step_s;
   }
 
   [[nodiscard]] bool simulate(const Eigen::VectorXd& x, double step_s, Eigen::MatrixXd& u) const {
     if (!(step_s > 0.0) || !set_.possible(x)) return false;
+    const ArmHypothesis arm = set_.arm(x);
+    u.resize(components(), frames_);
     Eigen::MatrixXd all;
-    if (!model_.simulate(set_.arm(x), step_s, all)) return false;
-    u = all.bottomRows(all.rows() - first_).transpose();
-    return true;
+    Eigen::Index to = 0;
+    for (std::size_t r = 0; r < models_.size(); ++r) {
+      if (set_.of_elongation()) {
+        models_[r].simulate_lengths(arm, all);
+      } else if (!models_[r].simulate(arm, step_s, all)) {
+        return false;
+      }
+      const Eigen::Index frames = all.rows() - firsts_[r];
+      u.middleCols(to, frames) = all.bottomRows(frames).transpose();
+      to += frames;
+    }
+    return u.allFinite();
   }
 
   [[nodiscard]] bool sensitivities(const Eigen::VectorXd& x, double step_s,
@@ -68,9 +85,11 @@ class Comparison {
                                    Eigen::MatrixXd& J) const {
     J.resize(at.size(), set_.size());
     std::atomic<bool> good = true;
+    const Eigen::VectorXd highest = set_.highest();
     in_parallel(static_cast<int>(set_.size()), threads, [&](int i) {
       Eigen::VectorXd moved = x;
-      const double difference = set_[i].difference;
+      const double difference =
+          x[i] + set_[i].difference > highest[i] ? -set_[i].difference : set_[i].difference;
       moved[i] += difference;
       Eigen::MatrixXd u;
       if (!simulate(moved, step_s, u)) {
@@ -83,15 +102,38 @@ class Comparison {
   }
 
   Eigen::MatrixXd measured() const {
-    return record_.u_rad.bottomRows(record_.u_rad.rows() - first_).transpose();
+    Eigen::MatrixXd out(components(), frames_);
+    Eigen::Index to = 0;
+    for (std::size_t r = 0; r < records_.size(); ++r) {
+      const Eigen::MatrixXd all =
+          set_.of_elongation() ? chord_lengths_m(records_[r]) : records_[r].u_rad;
+      const Eigen::Index frames = all.rows() - firsts_[r];
+      out.middleCols(to, frames) = all.bottomRows(frames).transpose();
+      to += frames;
+    }
+    return out;
   }
-  Eigen::VectorXd times() const { return record_.time_s.tail(record_.time_s.size() - first_); }
+  Eigen::VectorXd times() const {
+    Eigen::VectorXd out(frames_);
+    Eigen::Index to = 0;
+    for (std::size_t r = 0; r < records_.size(); ++r) {
+      const Eigen::Index frames = records_[r].time_s.size() - firsts_[r];
+      out.segment(to, frames) = records_[r].time_s.tail(frames);
+      to += frames;
+    }
+    return out;
+  }
 
  private:
+  Eigen::Index components() const {
+    return records_[0].u_rad.cols() / (set_.of_elongation() ? 2 : 1);
+  }
+
   const ParameterSet& set_;
-  const MotionRecord& record_;
-  ResponseModel model_;
-  Eigen::Index first_ = 0;
+  std::span<const MotionRecord> records_;
+  std::vector<ResponseModel> models_;
+  std::vector<Eigen::Index> firsts_;  ///< frame to be compared, of every record
+  Eigen::Index frames_ = 0;           ///< compared, of all
 };
 
 /// L^-1 of the covariance L L' of the columns of `residual`; its mean alone unless `weighted`.
@@ -122,8 +164,9 @@ class Search {
  public:
   Search(const Comparison& comparison, const ParameterSet& set, const RefinementOptions& options)
       : comparison_(comparison),
-        configured_(set.configured()),
+        expected_(set.expected()),
         lowest_(set.lowest()),
+        highest_(set.highest()),
         options_(options),
         measured_(comparison.measured()) {}
 
@@ -149,7 +192,7 @@ class Search {
  private:
   double cost(const Eigen::MatrixXd& u, const Eigen::VectorXd& x) const {
     const double prior = options_.prior > 0.0
-                             ? (x - configured_).squaredNorm() / (options_.prior * options_.prior)
+                             ? (x - expected_).squaredNorm() / (options_.prior * options_.prior)
                              : 0.0;
     return (whiten_ * (measured_ - u)).squaredNorm() / inflation_ + prior;
   }
@@ -174,9 +217,11 @@ class Search {
     if (fresh) J_at_ = out.x;
     Eigen::MatrixXd J = whitened(whiten_, J_);
     Eigen::VectorXd gradient = J.transpose() * (whiten_ * (measured_ - u)).reshaped() / inflation_;
-    if (options_.prior > 0.0) gradient += (configured_ - out.x) / (options_.prior * options_.prior);
+    if (options_.prior > 0.0) gradient += (expected_ - out.x) / (options_.prior * options_.prior);
     for (Eigen::Index i = 0; i < out.x.size(); ++i) {
-      if (out.x[i] > lowest_[i] || gradient[i] > 0.0) continue;
+      const bool low = out.x[i] <= lowest_[i] && gradient[i] <= 0.0;
+      const bool high = out.x[i] >= highest_[i] && gradient[i] >= 0.0;
+      if (!low && !high) continue;
       J.col(i).setZero();  // is at its limit
       gradient[i] = 0.0;
     }
@@ -193,14 +238,14 @@ class Search {
       const double length = along.cwiseProduct(inverse).dot(along);  // in squared standard errors
       const bool small = length < 1e-6 || step.cwiseAbs().maxCoeff() < 1e-10;
       Eigen::MatrixXd tried;
-      const Eigen::VectorXd x = (out.x + step).cwiseMax(lowest_);
+      const Eigen::VectorXd x = (out.x + step).cwiseMax(lowest_).cwiseMin(highest_);
       const double stable_s = comparison_.stable_step_s(x, step_s_);
       if (comparison_.simulate(x, stable_s, tried) && cost(tried, x) <= before) {
         out.x = x;
         u = tried;
         step_s_ = stable_s;
         damping = std::max(1e-12, 0.1 * damping);
-        out.converged = small || (fresh && before - cost(u, x) < kSame);
+        out.converged = small || (fresh && before - cost(u, x) < options_.least_gain);
         slow_ = length > 0.05 * length_;
         length_ = slow_ ? std::numeric_limits<double>::infinity() : length;
         report_progress(out);
@@ -217,7 +262,7 @@ class Search {
       promised = std::max(promised, length);
       damping = std::max(1e-9, 10.0 * damping);
     }
-    out.converged = promised < kSame;  // recorded inputs have kinks
+    out.converged = promised < options_.least_gain;  // recorded inputs have kinks
     return false;
   }
 
@@ -257,7 +302,7 @@ class Search {
   }
 
   const Comparison& comparison_;
-  Eigen::VectorXd configured_, lowest_;
+  Eigen::VectorXd expected_, lowest_, highest_;
   const RefinementOptions& options_;
   double step_s_ = 0.0;
   Eigen::MatrixXd measured_, whiten_;
@@ -287,15 +332,20 @@ double Refinement::half_width(Eigen::Index i) const {
 
 Refinement refine(const ParameterSet& set, const MotionRecord& record, const Eigen::VectorXd& start,
                   const RefinementOptions& options) {
-  const Comparison comparison(set, record);
+  return refine(set, std::span(&record, 1), start, options);
+}
+
+Refinement refine(const ParameterSet& set, std::span<const MotionRecord> records,
+                  const Eigen::VectorXd& start, const RefinementOptions& options) {
+  const Comparison comparison(set, records);
   Refinement out;
-  out.x = start;
+  out.x = start.cwiseMax(set.lowest()).cwiseMin(set.highest());
   compare(comparison, Search(comparison, set, options).run(out), out);
   return out;
 }
 
 Refinement predict(const ParameterSet& set, const MotionRecord& record, const Eigen::VectorXd& x) {
-  const Comparison comparison(set, record);
+  const Comparison comparison(set, std::span(&record, 1));
   Refinement out;
   out.x = x;
   Eigen::MatrixXd u;
@@ -306,7 +356,7 @@ Refinement predict(const ParameterSet& set, const MotionRecord& record, const Ei
 
 Eigen::MatrixXd sensitivities(const ParameterSet& set, const MotionRecord& record,
                               const Eigen::VectorXd& x, int threads) {
-  const Comparison comparison(set, record);
+  const Comparison comparison(set, std::span(&record, 1));
   Eigen::MatrixXd u, J;
   if (!comparison.sensitivities(x, comparison.response(x, u), u, threads, J))
     throw std::runtime_error("the response next to these parameters is not bounded");

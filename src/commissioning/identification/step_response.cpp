@@ -87,6 +87,7 @@ MotionRecord record_step_response(const Experiment& experiment, const StepPlan& 
   out.input.time_s.setZero(count + 1);
   out.input.value.setZero(count + 1, plant.chambers());
   Eigen::Index seen = 0;
+  double variance_rad2 = 0.0;
   std::vector<Eigen::Isometry3d> ends(static_cast<std::size_t>(n));
   MocapFrame frame;
   CurvatureEstimate estimate;
@@ -102,6 +103,8 @@ MotionRecord record_step_response(const Experiment& experiment, const StepPlan& 
                       [](bool each) { return each; })) {
         out.time_s[seen] = now_s;
         out.u_rad.row(seen++) = estimate.u_rad;
+        for (int i = 0; i < n; ++i)
+          variance_rad2 += estimate.variance_rad2[static_cast<std::size_t>(i)];
       }
     }
     const Eigen::Index step = (k - rest) / per_step;
@@ -114,6 +117,7 @@ MotionRecord record_step_response(const Experiment& experiment, const StepPlan& 
   }
   if (2 * seen < rows)
     throw std::runtime_error("more than half of all frames are lost: see plant.mocap");
+  out.noise_rad = std::sqrt(variance_rad2 / static_cast<double>(std::max<Eigen::Index>(1, seen * n)));
   out.time_s.conservativeResize(seen);
   out.u_rad.conservativeResize(seen, Eigen::NoChange);
   return out;

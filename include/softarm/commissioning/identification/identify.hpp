@@ -2,6 +2,7 @@
 // response.
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include "softarm/commissioning/identification/linear_fit.hpp"
@@ -21,6 +22,9 @@ struct IdentifyOptions {
 /// Identifies the parameters of `set` from `record`.
 /// @throws std::runtime_error as `fit_linear` and `refine`
 Refinement identify(const ParameterSet& set, const MotionRecord& record,
+                    const IdentifyOptions& options);
+/// The same from several records of one arm with one zero; least squares starts from the first.
+Refinement identify(const ParameterSet& set, std::span<const MotionRecord> records,
                     const IdentifyOptions& options);
 
 }  // namespace softarm

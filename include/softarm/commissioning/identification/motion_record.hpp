@@ -2,6 +2,9 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <vector>
+
+#include "softarm/actuation/fill_vent_lag.hpp"
 
 namespace softarm {
 
@@ -16,8 +19,12 @@ struct InputTrack {
 struct MotionRecord {
   Eigen::VectorXd time_s;  ///< of the frames that showed every segment, ascending
   Eigen::MatrixXd u_rad;   ///< one row per frame, 2n columns
+  /// Origin of S_i in S_{i-1}, m: one row per frame, 3n columns; empty: not recorded.
+  Eigen::MatrixXd chord_m;
   InputTrack input;
   double scored_from_s = 0.0;  ///< frames before this time are simulated, but not compared
+  /// RMS of a component of u that the noise configured for the frames explains; 0: not known.
+  double noise_rad = 0.0;
 
   /// The frames within [from_s, to_s), with a simulation that starts `lead_s` earlier.
   MotionRecord part(double from_s, double to_s, double lead_s) const;
@@ -25,12 +32,20 @@ struct MotionRecord {
   MotionRecord thinned(double apart_s) const;
 };
 
-/// The response of a first-order lag after a dead time to a track; exact for steps and straight
-/// lines.
+/// The length of every segment by its chord, as that of a constant-curvature segment whose chord has
+/// this direction: |t| x / sin x with x the angle between chord and axis; m, one row per frame, n
+/// columns.
+Eigen::MatrixXd chord_lengths_m(const MotionRecord& record);
+
+/// The response of a first-order lag after a dead time to a track. Exact for steps; for straight
+/// lines exact where filling and venting take the same time, otherwise but for the sample in which
+/// one becomes the other.
 class LaggedInput {
  public:
   /// Starts settled at the first value. @param track  must outlive this
   LaggedInput(const InputTrack& track, double lag_s, double dead_time_s);
+  /// @param lags  one per column of the track
+  LaggedInput(const InputTrack& track, std::vector<FillVentLag> lags, double dead_time_s);
 
   /// Writes the value at `t_s`, which must not decrease from call to call, to `out`. At a jump
   /// (without a lag): the value after the jump, or before it if `before`.
@@ -40,7 +55,8 @@ class LaggedInput {
   void advance(double t_s);
 
   const InputTrack& track_;
-  double lag_s_, dead_time_s_;
+  std::vector<FillVentLag> lags_;
+  double dead_time_s_;
   double now_s_;
   Eigen::Index index_ = 0;  ///< the last sample that has been reached
   Eigen::VectorXd state_;

@@ -35,6 +35,18 @@ struct FitChoice {
   bool delay = true;
   bool rest = false;
   bool cubic = false;
+  bool venting = false;       ///< another lag for venting than for filling, the same in all chambers
+  bool chamber_lags = false;  ///< filling and venting of every chamber
+  bool saturation = false;    ///< of every chamber: p counts as p (1 + q p)
+  bool hysteresis = false;    ///< slip springs, at radii taken from the motion
+  bool remanence = false;     ///< the rest creeps after use: share, time, and where it is at first
+  bool stiffening = false;    ///< k (1 + s sum p)
+  bool cross = false;         ///< chambers act on the other segments, too
+  bool mass = false;          ///< one factor on all masses, against the configured ones
+  bool length = false;        ///< one factor on all lengths
+  bool load = false;          ///< a point mass at the tip
+  /// How the segments stretch, instead of how they bend: only the elongation is identified.
+  bool elongation = false;
 };
 
 /// One unknown. The search uses units of its scale.
@@ -46,6 +58,10 @@ struct Parameter {
   std::function<void(ArmHypothesis&, double value)> set;     ///< in its unit
   double lowest = -std::numeric_limits<double>::infinity();  ///< in its unit
   double difference = 1e-5;  ///< step for sensitivities, in its scale
+  /// Where the prior has it, in its unit; NaN: as configured.
+  double expected = std::numeric_limits<double>::quiet_NaN();
+  double highest = std::numeric_limits<double>::infinity();  ///< in its unit
+  bool linear = false;                                       ///< whether (16) is linear in it
 };
 
 /// The unknowns of a choice. Vectors x have one number per unknown, in its scale.
@@ -63,7 +79,10 @@ class ParameterSet {
 
   Eigen::VectorXd of(const ArmHypothesis& arm) const;        ///< the unknowns of an arm
   Eigen::VectorXd configured() const { return of(start_); }  ///< those of `start`, as configured
+  Eigen::VectorXd expected() const;                          ///< centre of the prior
   Eigen::VectorXd lowest() const;                            ///< lower limits
+  Eigen::VectorXd highest() const;                           ///< upper limits
+  bool of_elongation() const { return elongation_; }         ///< of lengths, not of the bend
   /// The arm with the unknowns x.
   ArmHypothesis arm(const Eigen::VectorXd& x) const;
   /// Whether the arm is physically possible: no negative stiffness, damping or lag.
@@ -75,8 +94,13 @@ class ParameterSet {
   void add_impedance(const FitChoice& choice);
   void add_gains(const FitChoice& choice);
   void add_times(const FitChoice& choice);
+  void add_lags(const FitChoice& choice);
+  void add_memory(const FitChoice& choice);
+  void add_masses(const FitChoice& choice);
+  void add_elongation(const FitChoice& choice);
 
   ArmHypothesis start_;
+  bool elongation_ = false;
   std::vector<Parameter> parameters_;
 };
 

@@ -2,21 +2,25 @@
 #pragma once
 
 #include <functional>
+#include <span>
 #include <string>
 
 #include "softarm/commissioning/identification/parameter_set.hpp"
 
 namespace softarm {
 
-/// Settings of `refine`.
+/// Settings of `refine`. What is compared is u in rad, or, where the set is of the elongation, the
+/// lengths by `chord_lengths_m` in m: all below that ends in _rad is then in m.
 struct RefinementOptions {
   int most_rounds = 40;
-  /// Standard deviation, in the parameters' scales, of the prior at the configured values; 0: no
-  /// prior.
+  /// Standard deviation, in the parameters' scales, of the prior at the set's `expected` values; 0:
+  /// no prior.
   double prior = 0.0;
   /// false: all components have the same weight, so that the RMS is minimised (without a prior).
   bool weighted = true;
   int threads = 1;
+  /// A round that lowers the cost by less, in squared standard errors, is the last.
+  double least_gain = 1e-4;
   std::function<void(const std::string&)> progress;  ///< may be empty
 };
 
@@ -54,6 +58,11 @@ struct Refinement {
 /// @throws std::runtime_error if no response can be simulated at `start`
 Refinement refine(const ParameterSet& set, const MotionRecord& record, const Eigen::VectorXd& start,
                   const RefinementOptions& options);
+
+/// The same for several records of one arm with one zero, together. Times in the result are those of
+/// every record, one after the other.
+Refinement refine(const ParameterSet& set, std::span<const MotionRecord> records,
+                  const Eigen::VectorXd& start, const RefinementOptions& options);
 
 /// The response at `x` without a fit, compared in the same way.
 Refinement predict(const ParameterSet& set, const MotionRecord& record, const Eigen::VectorXd& x);

@@ -1,0 +1,44 @@
+// Whether what was identified explains what was recorded, and what else would.
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "softarm/commissioning/identification/refinement.hpp"
+
+namespace softarm {
+
+/// A term that was left out, and what is left over with it.
+struct MisfitCause {
+  std::string name;
+  double value = 0.0;  ///< of its first unknown, in `unit`
+  std::string unit;
+  double rms_rad = 0.0;
+};
+
+/// The residual beside the noise of the frames.
+struct Misfit {
+  double noise_rad = 0.0;  ///< RMS of a component, as configured; 0: not known, nothing is judged
+  double ratio = 0.0;      ///< of the residual's RMS to it
+  bool significant = false;
+  std::vector<MisfitCause> causes;  ///< those that explain some of it, the likeliest first
+  /// By how much the unknowns change with the causes, at most, in the scales of the set: noise does
+  /// not make this error, so intervals that count it alone are too narrow.
+  Eigen::VectorXd shift;
+};
+
+/// A residual beyond 1.25 times the noise is no noise (a thousand frames scatter by 3 %). Then a load
+/// at the tip, another length, other masses, hysteresis, a rest offset and a cubic stiffness are
+/// freed in turn, as far as `choice` has them fixed.
+Misfit judge_misfit(const ArmHypothesis& start, ActuationKind kind, const FitChoice& choice,
+                    std::span<const MotionRecord> records, const Refinement& fit,
+                    const RefinementOptions& options);
+
+/// Widens the intervals of `fit` by the shift.
+void widen(const Misfit& misfit, Refinement& fit);
+
+/// For a person; empty where nothing is wrong or known.
+std::string misfit_text(const Misfit& misfit);
+
+}  // namespace softarm

@@ -1,0 +1,67 @@
+// Which terms a model of an arm needs, chosen by what it predicts on motion that it has not seen.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "softarm/commissioning/identification/identify.hpp"
+
+namespace softarm {
+
+/// A part to identify from, and one to judge by.
+struct Fold {
+  std::vector<MotionRecord> seen;
+  MotionRecord unseen;
+};
+
+/// The halves of the time scored of one record, each judged by the other. Both are simulated from
+/// the beginning of the record, so that what remembers knows what was before.
+std::vector<Fold> halves(const MotionRecord& record);
+
+/// Several records of one arm with one zero: each is judged by all others. Of one record, its
+/// halves.
+std::vector<Fold> folds_of(std::span<const MotionRecord> records);
+
+/// A term that was tried.
+struct TermTrial {
+  std::string name;
+  Eigen::Index parameters = 0;     ///< of the model with it
+  double unseen = 0.0;             ///< RMS over all folds; rad, or m of an elongation
+  std::vector<double> unseen_of;   ///< of every fold
+  bool kept = false;
+  double seconds = 0.0;  ///< of the searches
+};
+
+/// The result of a selection.
+struct SelectedModel {
+  FitChoice choice;
+  double prior = 1.0;                  ///< width of the prior that predicts best
+  std::vector<TermTrial> trials;       ///< in order; the first is the plain model
+  std::vector<ArmHypothesis> by_fold;  ///< identified in every fold with `choice`
+  ArmHypothesis arm;                   ///< identified from all records
+  Refinement whole;                    ///< how it fits all of them
+};
+
+/// Settings of `select_terms`.
+struct SelectionOptions {
+  IdentifyOptions identify;
+  double least_gain = 0.01;  ///< relative, of the error on what was not seen; less is no gain
+  std::function<void(const std::string&)> progress;  ///< may be empty
+};
+
+/// Begins with `plain` and adds, in the order of the value that they had on real arms, one term at a
+/// time: asymmetric lag, rest, hysteresis, saturation, lags of every chamber, masses (gravity beside
+/// k), remanence, delay, stiffening, cubic stiffness, cross-coupling. A term stays if the error on
+/// what was not seen becomes less by `least_gain`; then narrower priors are tried in the same way.
+/// @param start  what is configured; every segment gets slip springs at radii taken from the motion
+/// @throws std::runtime_error as `identify`, of the plain model only
+SelectedModel select_terms(const ArmHypothesis& start, ActuationKind kind, const FitChoice& plain,
+                           std::span<const MotionRecord> records, const std::vector<Fold>& folds,
+                           const SelectionOptions& options);
+
+/// Every term with its price and its gain, for a person.
+std::string selection_text(const SelectedModel& model, double motion, double unit,
+                           const char* unit_name);
+
+}  // namespace softarm

@@ -1,0 +1,200 @@
+#include "softarm/commissioning/identification/term_selection.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+namespace softarm {
+namespace {
+
+struct Term {
+  const char* name;
+  bool FitChoice::*flag;
+};
+
+constexpr Term kOfBend[] = {
+    {"filling and venting", &FitChoice::venting},
+    {"rest", &FitChoice::rest},
+    {"hysteresis", &FitChoice::hysteresis},
+    {"saturation", &FitChoice::saturation},
+    {"lags of every chamber", &FitChoice::chamber_lags},
+    {"masses", &FitChoice::mass},
+    {"remanence", &FitChoice::remanence},
+    {"delay", &FitChoice::delay},
+    {"stiffening", &FitChoice::stiffening},
+    {"cubic stiffness", &FitChoice::cubic},
+    {"cross-coupling", &FitChoice::cross},
+};
+constexpr Term kOfElongation[] = {
+    {"saturation", &FitChoice::saturation},       {"lags of every chamber", &FitChoice::chamber_lags},
+    {"friction", &FitChoice::hysteresis},         {"remanence", &FitChoice::remanence},
+    {"cross-coupling", &FitChoice::cross},
+};
+constexpr double kNarrowerPriors[] = {0.5, 0.25};
+constexpr double kRadii[] = {0.3, 1.0, 2.5};  ///< of slip springs, of the motion's RMS
+
+/// RMS of a component of the motion about its mean.
+double motion_rms(const Eigen::MatrixXd& rows) {
+  const Eigen::RowVectorXd mean = rows.colwise().mean();
+  return std::sqrt((rows.rowwise() - mean).squaredNorm() / static_cast<double>(rows.size()));
+}
+
+/// One choice in every fold.
+struct Attempt {
+  TermTrial trial;
+  std::vector<ArmHypothesis> arms;
+};
+
+class Selection {
+ public:
+  Selection(const ArmHypothesis& start, ActuationKind kind, std::span<const MotionRecord> records,
+            const std::vector<Fold>& folds, const SelectionOptions& options)
+      : start_(start), kind_(kind), records_(records), folds_(folds), options_(options) {
+    double rms = 0.0;
+    for (const MotionRecord& record : records) rms = std::max(rms, motion_rms(record.u_rad));
+    if (start_.slip_springs.empty())
+      for (const double radius : kRadii) start_.slip_springs.push_back({radius * rms, 0.0});
+  }
+
+  SelectedModel run(const FitChoice& plain) {
+    SelectedModel out;
+    out.choice = plain;
+    out.prior = options_.identify.refinement.prior;
+    Attempt best = attempt("plain", out.choice, out.prior, nullptr);
+    best.trial.kept = true;
+    out.trials.push_back(best.trial);
+    if (!std::isfinite(best.trial.unseen))
+      throw std::runtime_error("the plain model has no bounded response to these records");
+    const auto consider = [&](const char* name, const FitChoice& choice, double prior) {
+      Attempt tried = attempt(name, choice, prior, &best);
+      tried.trial.kept = tried.trial.unseen < (1.0 - options_.least_gain) * best.trial.unseen;
+      out.trials.push_back(tried.trial);
+      if (!tried.trial.kept) return;
+      out.choice = choice;
+      out.prior = prior;
+      best = std::move(tried);
+    };
+    for (const Term& term : plain.elongation ? std::span<const Term>(kOfElongation)
+                                             : std::span<const Term>(kOfBend)) {
+      if (plain.*term.flag || !applies(term)) continue;
+      FitChoice with = out.choice;
+      with.*term.flag = true;
+      consider(term.name, with, out.prior);
+    }
+    if (out.prior > 0.0)
+      for (const double part : kNarrowerPriors)
+        consider(fmt::format("prior of {:.0f} %", 100.0 * part * options_.identify.refinement.prior)
+                     .c_str(),
+                 out.choice, part * options_.identify.refinement.prior);
+    const ParameterSet set(start_, kind_, out.choice);
+    out.whole = find(set, records_, out.prior, best.arms);
+    out.arm = set.arm(out.whole.x);
+    out.by_fold = std::move(best.arms);
+    return out;
+  }
+
+ private:
+  bool applies(const Term& term) const {
+    return term.flag != &FitChoice::cross || start_.arm.size() > 1;
+  }
+
+  Refinement find(const ParameterSet& set, std::span<const MotionRecord> records, double prior,
+                  const std::vector<ArmHypothesis>& near) const {
+    IdentifyOptions options = options_.identify;
+    options.refinement.prior = prior;
+    options.near.insert(options.near.end(), near.begin(), near.end());
+    return identify(set, records, options);
+  }
+
+  Attempt attempt(const std::string& name, const FitChoice& choice, double prior,
+                  const Attempt* simpler) const {
+    if (options_.progress) options_.progress(name);
+    const auto begin = std::chrono::steady_clock::now();
+    const ParameterSet set(start_, kind_, choice);
+    Attempt out;
+    out.trial.name = name;
+    out.trial.parameters = set.size();
+    double squares = 0.0, count = 0.0;
+    for (std::size_t i = 0; i < folds_.size(); ++i) {
+      std::vector<ArmHypothesis> near;
+      if (simpler != nullptr) near.push_back(simpler->arms[i]);
+      double rms = std::numeric_limits<double>::quiet_NaN();
+      try {
+        const Refinement fit = find(set, folds_[i].seen, prior, near);
+        out.arms.push_back(set.arm(fit.x));
+        const Refinement unseen = predict(set, folds_[i].unseen, fit.x);
+        rms = unseen.rms_rad;
+        const auto samples = static_cast<double>(unseen.time_s.size());
+        squares += samples * rms * rms;
+        count += samples;
+      } catch (const std::runtime_error&) {
+        if (out.arms.size() == i) out.arms.push_back(simpler ? simpler->arms[i] : start_);
+        squares = std::numeric_limits<double>::quiet_NaN();
+      }
+      out.trial.unseen_of.push_back(rms);
+    }
+    out.trial.unseen = std::sqrt(squares / count);
+    out.trial.seconds =
+        std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    return out;
+  }
+
+  ArmHypothesis start_;
+  ActuationKind kind_;
+  std::span<const MotionRecord> records_;
+  const std::vector<Fold>& folds_;
+  const SelectionOptions& options_;
+};
+
+}  // namespace
+
+std::vector<Fold> halves(const MotionRecord& record) {
+  const double begin_s = std::max(record.scored_from_s, record.time_s[0]);
+  const double end_s = record.time_s[record.time_s.size() - 1] + 1e-6;
+  const double middle_s = 0.5 * (begin_s + end_s);
+  const MotionRecord first = record.part(begin_s, middle_s, begin_s - record.time_s[0]);
+  const MotionRecord second = record.part(middle_s, end_s, middle_s - record.time_s[0]);
+  return {{{first}, second}, {{second}, first}};
+}
+
+std::vector<Fold> folds_of(std::span<const MotionRecord> records) {
+  if (records.size() == 1) return halves(records.front());
+  std::vector<Fold> out;
+  for (std::size_t i = 0; i < records.size(); ++i) {
+    Fold fold{{}, records[i]};
+    for (std::size_t k = 0; k < records.size(); ++k)
+      if (k != i) fold.seen.push_back(records[k]);
+    out.push_back(std::move(fold));
+  }
+  return out;
+}
+
+SelectedModel select_terms(const ArmHypothesis& start, ActuationKind kind, const FitChoice& plain,
+                           std::span<const MotionRecord> records, const std::vector<Fold>& folds,
+                           const SelectionOptions& options) {
+  return Selection(start, kind, records, folds, options).run(plain);
+}
+
+std::string selection_text(const SelectedModel& model, double motion, double unit,
+                           const char* unit_name) {
+  std::string text = fmt::format(
+      "rms error on motion not seen, predicted from the input alone, in {}; the motion's own about "
+      "its mean: {:.2f}\n{:<26}{:>10}{:>10}{:>10}  {}\n",
+      unit_name, unit * motion, "term", "unknowns", "unseen", "gain", "of every part");
+  double best = model.trials.front().unseen;
+  for (const TermTrial& trial : model.trials) {
+    std::string parts;
+    for (const double each : trial.unseen_of) parts += fmt::format("{:8.2f}", unit * each);
+    text += fmt::format("{:<26}{:>10}{:>10.2f}{:>9.1f}%{}  {}\n", trial.name, trial.parameters,
+                        unit * trial.unseen, 100.0 * (best - trial.unseen) / best,
+                        parts, trial.kept ? "kept" : "left out");
+    if (trial.kept) best = trial.unseen;
+  }
+  return text;
+}
+
+}  // namespace softarm
