@@ -86,6 +86,10 @@ class Arm:
         """
         A(u), (2n, 2n): generalized force = A tau_A; (15).
         """
+    def actuation_slope(self, u: numpy.ndarray, tau_actuation_nm: numpy.ndarray) -> numpy.ndarray:
+        """
+        d (A(u) tau_A) / du with tau_A held, (2n, 2n), N m/rad; zero for 'chamber'.
+        """
     def centre_line(self, u: numpy.ndarray, points_per_segment: int = 16) -> numpy.ndarray:
         """
         Points on the arm from base to tip, (n points_per_segment + 1, 3), m, world.
@@ -97,6 +101,13 @@ class Arm:
     def forward_dynamics(self, u: numpy.ndarray, velocity: numpy.ndarray, generalized_force_nm: numpy.ndarray) -> numpy.ndarray:
         """
         u'' of (16), (2n,), rad/s^2, for a generalized force A tau_A + J' f in N m.
+        """
+    def forward_dynamics_derivatives(self, u: numpy.ndarray, velocity: numpy.ndarray, generalized_force_nm: numpy.ndarray) -> tuple:
+        """
+        (u'', d u''/du, d u''/du', d u''/d force), force held: (2n,) and three of (2n, 2n).
+        
+        Exact. By pressures: by_force @ allocator.input_matrix; a force that depends on u adds
+        by_force @ (its slope) to the second.
         """
     def gravity(self, u: numpy.ndarray) -> numpy.ndarray:
         """
@@ -113,6 +124,11 @@ class Arm:
     def inverse_dynamics(self, u: numpy.ndarray, velocity: numpy.ndarray, acceleration: numpy.ndarray) -> numpy.ndarray:
         """
         Generalized force B u'' + C u' + D u' + G + K u of (16), (2n,), N m; O(n).
+        """
+    def inverse_dynamics_by_u(self, u: numpy.ndarray, velocity: numpy.ndarray, acceleration: numpy.ndarray) -> numpy.ndarray:
+        """
+        d inverse_dynamics / du with u' and u'' held, (2n, 2n), N m/rad; exact. By u': 2 C + D,
+        by u'': B.
         """
     def kinetic_energy(self, u: numpy.ndarray, velocity: numpy.ndarray) -> float:
         """
@@ -133,6 +149,11 @@ class Arm:
     def static_moments(self, u: numpy.ndarray) -> numpy.ndarray:
         """
         K u + G(u), (2n,), N m: the generalized force that holds u at rest.
+        """
+    def static_stiffness(self, u: numpy.ndarray) -> numpy.ndarray:
+        """
+        K + dG/du, (2n, 2n), N m/rad: the slope of static_moments, exact. The shape at rest moves
+        by solve(static_stiffness(u), allocator.input_matrix) for 1 bar in each chamber.
         """
     def tip(self, u: numpy.ndarray) -> numpy.ndarray:
         """
@@ -186,6 +207,11 @@ class Allocator:
     @property
     def chambers(self) -> int:
         ...
+    @property
+    def input_matrix(self) -> numpy.ndarray:
+        """
+        d generalized_force / d pressure, (2n, chambers), N m/bar: it does not depend on u.
+        """
 class Controller:
     """
     The controller (17) of an experiment.

@@ -13,7 +13,8 @@ namespace softarm::python {
 /// Python calls with the interpreter's lock held.
 struct Arm {
   explicit Arm(const ArmParameters& arm) : parameters(arm), workspace(arm) {}
-  const Eigen::VectorXd& u(const Eigen::VectorXd& value, const char* name = "u") const {
+  /// The argument itself, checked: for use within the same expression.
+  ConstVectorRef u(ConstVectorRef value, const char* name = "u") const {
     return expect(value, parameters.dof(), name);
   }
   /// Made at the first use: its storage is many times that of the dynamics.

@@ -13,8 +13,8 @@ using Eigen::VectorXd;
 
 MatrixXd square(const Arm& arm) { return {arm.parameters.dof(), arm.parameters.dof()}; }
 
-py::tuple forward_dynamics_derivatives(Arm& arm, const VectorXd& u, const VectorXd& velocity,
-                                       const VectorXd& force) {
+py::tuple forward_dynamics_derivatives(Arm& arm, ConstVectorRef u, ConstVectorRef velocity,
+                                       ConstVectorRef force) {
   VectorXd acceleration(arm.parameters.dof());
   MatrixXd by_u = square(arm), by_velocity = square(arm), by_force = square(arm);
   if (!arm.derivatives().forward_dynamics(arm.u(u), arm.u(velocity, "velocity"),
@@ -36,7 +36,7 @@ void bind_derivatives(py::class_<Arm>& type) {
           "by_force @ (its slope) to the second.")
       .def(
           "inverse_dynamics_by_u",
-          [](Arm& arm, const VectorXd& u, const VectorXd& velocity, const VectorXd& acceleration) {
+          [](Arm& arm, ConstVectorRef u, ConstVectorRef velocity, ConstVectorRef acceleration) {
             MatrixXd by_u = square(arm);
             arm.derivatives().inverse_dynamics_by_u(arm.u(u), arm.u(velocity, "velocity"),
                                                     arm.u(acceleration, "acceleration"), by_u);
@@ -48,7 +48,7 @@ void bind_derivatives(py::class_<Arm>& type) {
           "by u'': B.")
       .def(
           "static_stiffness",
-          [](Arm& arm, const VectorXd& u) {
+          [](Arm& arm, ConstVectorRef u) {
             MatrixXd by_u = square(arm);
             arm.derivatives().static_stiffness(arm.u(u), by_u);
             return by_u;
@@ -59,7 +59,7 @@ void bind_derivatives(py::class_<Arm>& type) {
           "by solve(static_stiffness(u), allocator.input_matrix) for 1 bar in each chamber.")
       .def(
           "actuation_slope",
-          [](const Arm& arm, const VectorXd& u, const VectorXd& tau) {
+          [](const Arm& arm, ConstVectorRef u, ConstVectorRef tau) {
             MatrixXd by_u = square(arm);
             actuation_slope(arm.parameters, arm.u(u), arm.u(tau, "tau_actuation_nm"), by_u);
             return by_u;

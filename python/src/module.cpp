@@ -10,7 +10,7 @@
 
 namespace softarm::python {
 
-const Eigen::VectorXd& expect(const Eigen::VectorXd& vector, Eigen::Index size, const char* name) {
+ConstVectorRef expect(ConstVectorRef vector, Eigen::Index size, const char* name) {
   if (vector.size() != size) {
     throw std::invalid_argument(
         fmt::format("{}: expected {} numbers, got {}", name, size, vector.size()));

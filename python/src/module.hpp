@@ -22,8 +22,9 @@ void bind_control(py::module_& module);
 void bind_simulation(py::module_& module);
 void bind_client(py::module_& module);
 
-/// An argument of `size` finite numbers. @throws std::invalid_argument (ValueError) naming it.
-const Eigen::VectorXd& expect(const Eigen::VectorXd& vector, Eigen::Index size, const char* name);
+/// An argument of `size` finite numbers, itself: for use within the same expression.
+/// @throws std::invalid_argument (ValueError) naming it.
+ConstVectorRef expect(ConstVectorRef vector, Eigen::Index size, const char* name);
 
 /// Poses as an array (n, 4, 4).
 py::array_t<double> pose_array(const std::vector<Eigen::Isometry3d>& poses);

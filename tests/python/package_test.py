@@ -67,6 +67,47 @@ class Model(unittest.TestCase):
         np.testing.assert_allclose(np.linalg.norm(np.diff(line[11:21], axis=0), axis=1), 0.011, rtol=1e-12)
         np.testing.assert_allclose(softarm.polar_to_u(softarm.u_to_polar(u)), u, atol=1e-15)
 
+    def test_derivatives_are_those_of_the_functions(self):
+        """Against central differences of the functions themselves; the numerics tests hold them against 80-bit ones."""
+        experiment = softarm.load_experiment(PAPER_ARM)
+        arm, allocator = softarm.Arm(experiment), softarm.Allocator(experiment)
+        random = np.random.default_rng(4)
+        u, velocity = random.normal(size=(2, arm.dof))
+        pressure = random.uniform(0.0, 1.0, allocator.chambers)
+
+        def slope(f, x, step=1e-5):
+            return np.column_stack([(f(x + d) - f(x - d)) / (2 * step) for d in step * np.eye(len(x))])
+
+        force = allocator.generalized_force(pressure)
+        acceleration, by_u, by_velocity, by_force = arm.forward_dynamics_derivatives(u, velocity, force)
+        np.testing.assert_allclose(acceleration, arm.forward_dynamics(u, velocity, force), rtol=1e-10)
+        size = np.abs(acceleration).max()
+        for got, want in (
+            (by_u, slope(lambda x: arm.forward_dynamics(x, velocity, force), u)),
+            (by_velocity, slope(lambda x: arm.forward_dynamics(u, x, force), velocity)),
+            (
+                by_force @ allocator.input_matrix,
+                slope(lambda p: arm.forward_dynamics(u, velocity, allocator.generalized_force(p)), pressure),
+            ),
+        ):
+            np.testing.assert_allclose(got, want, rtol=0, atol=1e-7 * (size + np.abs(want).max()))
+        np.testing.assert_allclose(arm.static_stiffness(u), slope(arm.static_moments, u), atol=1e-8)
+        np.testing.assert_allclose(
+            arm.inverse_dynamics_by_u(u, velocity, acceleration),
+            slope(lambda x: arm.inverse_dynamics(x, velocity, acceleration), u),
+            atol=1e-7,
+        )
+        self.assertEqual(np.abs(arm.actuation_slope(u, force)).max(), 0.0)
+
+    def test_the_shape_at_rest_moves_as_its_stiffness_says(self):
+        experiment = softarm.load_experiment(PAPER_ARM)
+        arm = softarm.Arm(experiment)
+        moments = np.array([0.1, -0.2, 0.05, 0.1, 0.0, 0.1])
+        u = arm.rest_shape(moments)
+        step = 1e-5 * np.array([1.0, 2.0, -1.0, 0.5, 1.0, -2.0])
+        moved = (arm.rest_shape(moments + step) - arm.rest_shape(moments - step)) / 2
+        np.testing.assert_allclose(np.linalg.solve(arm.static_stiffness(u), arm.actuation_matrix(u) @ step), moved, atol=1e-12)
+
     def test_what_does_not_fit_is_named(self):
         arm = softarm.Arm(softarm.load_experiment(PAPER_ARM))
         with self.assertRaisesRegex(ValueError, "u: expected 6 numbers, got 4"):

@@ -13,7 +13,7 @@ import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "tests/scripts"), str(ROOT / "build/release/python")]
-from running_arm import go_on_in_our_python, own_url, skip_without_multicast, start, wait_for, write_config  # noqa: E402
+from running_arm import SAFETY, go_on_in_our_python, own_url, skip_without_multicast, start, wait_for, write_config  # noqa: E402
 
 go_on_in_our_python()
 import browser  # noqa: E402
@@ -68,7 +68,7 @@ class Pages(unittest.TestCase):
         arm = softarm.Arm(experiment)
         view = softarm.view.View(experiment, "127.0.0.1", 0)
         self.addCleanup(view.server.stop)
-        size = (900, 700)
+        size = (1100, 900)
         with browser.Page(f"http://127.0.0.1:{view.server.get_port()}/", size) as page:
             wait_for(lambda: view.server.get_clients(), "a client")
             (client,) = view.server.get_clients().values()
@@ -80,8 +80,8 @@ class Pages(unittest.TestCase):
                 self.assertIsNotNone(wanted)
 
                 def seen(near=wanted):
-                    found = self.orange(page.screenshot())
-                    return found is not None and np.linalg.norm(found - near) < 8.0
+                    found = self.orange(page.screenshot(), near)
+                    return found is not None and np.linalg.norm(found - near) < 4.0
 
                 wait_for(seen, f"a tip at {wanted}")
             self.assertEqual(page.errors, [])
@@ -102,15 +102,16 @@ class Pages(unittest.TestCase):
         return focal * ahead[:2] / ahead[2] + 0.5 * np.array([camera.image_width, camera.image_height])
 
     @staticmethod
-    def orange(png):
-        """Middle of the pixels of the tip's colour, (x, y); None where there are none."""
+    def orange(png, near, reach=40):
+        """Middle of the pixels of the tip's colour around a place, (x, y); None where there are too few."""
         r, g, b = np.moveaxis(np.asarray(PIL.Image.open(io.BytesIO(png)).convert("RGB")).astype(int), -1, 0)
-        rows, columns = np.nonzero((r > 120) & (r > 2 * g) & (r > 3 * b))
-        return np.array([columns.mean(), rows.mean()]) if rows.size > 20 else None
+        rows, columns = np.nonzero((r > 150) & (r > g + 80) & (g > b + 20))
+        close = (abs(columns - near[0]) < reach) & (abs(rows - near[1]) < reach)
+        return np.array([columns[close].mean(), rows[close].mean()]) if np.count_nonzero(close) > 40 else None
 
     def test_a_live_arm_and_its_buttons(self):
         skip_without_multicast()
-        config = write_config(self.folder, "one_segment_live.yaml", own_url())
+        config = write_config(self.folder, "one_segment.yaml", own_url(), safety=SAFETY + ", arming: explicit")
         start(self, self.folder, BIN / "softarm-plant", config)
         start(self, self.folder, BIN / "softarmd", config)
         page = subprocess.Popen(
@@ -130,7 +131,7 @@ class Pages(unittest.TestCase):
             def says(text):
                 shown.wait(f"(document.body?.innerText ?? '').includes({text!r})")
 
-            says("IDLE")
+            says("WAIT_FRAMES")
             shown.click("arm")
             says("arm this arm?")
             self.assertNotEqual(mode(), "ACTIVE", "armed before the question was answered")

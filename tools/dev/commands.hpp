@@ -27,6 +27,10 @@ void add_bench_plant_command(CLI::App& group);
 /// to `softarm-dev bench`
 void add_bench_loop_command(CLI::App& group);
 
+/// softarm-dev bench python [--json] [--seconds S] [--soromox PYTHON] [CONFIG]: added to
+/// `softarm-dev bench`
+void add_bench_python_command(CLI::App& group);
+
 /// softarm-dev fault CONFIG FAULT | --list
 void add_fault_command(CLI::App& app);
 
