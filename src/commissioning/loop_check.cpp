@@ -93,6 +93,8 @@ Experiment at(const Corner& corner, Experiment e) {
   for (SegmentParameters& segment : e.plant.arm.segments) {
     segment.stiffness_nm_per_rad *= 1.0 + corner.stiffness * part;
     segment.damping_nms_per_rad *= 1.0 + corner.damping * part;
+    segment.axial_stiffness_n_per_m *= 1.0 + corner.stiffness * part;
+    segment.axial_damping_ns_per_m *= 1.0 + corner.damping * part;
     segment.mass_kg *= 1.0 + corner.mass * part;
     segment.length_m *= 1.0 + corner.length * part;
   }
