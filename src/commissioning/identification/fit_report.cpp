@@ -64,6 +64,12 @@ std::string chambers_yaml(const ArmHypothesis& arm, const ActuationSettings& act
   return text;
 }
 
+/// Gravity, where it is not that of the configuration.
+std::string gravity_yaml(const Eigen::Vector3d& gravity_mps2, const char* indent) {
+  return fmt::format("{}gravity_mps2: {}\n", indent,
+                     list(3, [&](int i) { return gravity_mps2[i]; }));
+}
+
 std::string segments_yaml(const ArmParameters& arm, const char* indent) {
   const auto of = [&](double SegmentParameters::*member) {
     return list(arm.size(),
@@ -139,6 +145,8 @@ std::string identified_yaml(const Experiment& experiment, const ArmHypothesis& a
   std::string text = fmt::format("# {}\ninclude: {}\n\narm:\n{}", note,
                                  fs::proximate(fs::absolute(config), folder).string(),
                                  segments_yaml(arm.arm, "  "));
+  const bool turned = arm.arm.gravity_mps2 != experiment.arm.gravity_mps2;
+  if (turned) text += gravity_yaml(arm.arm.gravity_mps2, "  ");
   if (chambers)
     text += "\nactuation:\n  chambers:\n" + chambers_yaml(arm, experiment.actuation, "  ");
   text += fmt::format(
@@ -154,6 +162,7 @@ std::string identified_yaml(const Experiment& experiment, const ArmHypothesis& a
     text += fmt::format("\ncontrol:\n  valve_lag_s: {:.6g}\n", arm.lag_s);
   text += "\n# The simulated arm is what it was.\nplant:\n  arm:\n" +
           segments_yaml(experiment.plant.arm, "    ");
+  if (turned) text += gravity_yaml(experiment.plant.arm.gravity_mps2, "    ");
   if (chambers)
     text += "  actuation:\n    chambers:\n" +
             chambers_yaml(of_plant(experiment), experiment.plant.actuation, "    ");
