@@ -165,8 +165,8 @@ void OperatorClient::record(const std::filesystem::path& log) {
   log_.emplace(log);
   for (const std::string& channel :
        {lcm_.mocap_channel, lcm_.command_channel, lcm_.measurement_channel, lcm_.reference_channel,
-        lcm_.operator_channel, lcm_.timing_channel, lcm_.tick_channel, lcm_.valves_channel,
-        lcm_.plant_channel, lcm_.deadman_channel})
+        lcm_.operator_channel, lcm_.timing_channel, lcm_.observer_channel, lcm_.tick_channel,
+        lcm_.valves_channel, lcm_.plant_channel, lcm_.deadman_channel})
     if (!channel.empty()) listen(channel, {});
 }
 

@@ -51,6 +51,7 @@ class Checks {
     check_lcm();
     check_valves();
     check_loads();
+    check_contact();
     check_module("control", "settings the controller can use", [&] {
       std::make_unique<CurvatureController>(experiment_.arm, experiment_.control);
     });
@@ -354,6 +355,16 @@ class Checks {
     const std::string fault =
         register_map_fault(it.registers, it.order, experiment_.actuation.max_pressure_bar);
     require(fault.empty(), "valves.registers", "registers that fit together", fault);
+  }
+
+  void check_contact() const {
+    require(experiment_.safety.contact_segment <= experiment_.arm.size(),
+            "daemon.safety.contact_segment", fmt::format("at most {}", experiment_.arm.size()),
+            fmt::format("{}", experiment_.safety.contact_segment));
+    require(experiment_.safety.contact_force_n <= 0.0 ||
+                experiment_.estimation.observer == ObserverKind::model,
+            "daemon.safety.contact_force_n", "0 without estimation.observer: model",
+            fmt::format("{}", experiment_.safety.contact_force_n));
   }
 
   void check_loads() const {

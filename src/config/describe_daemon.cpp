@@ -81,6 +81,15 @@ static void describe(Keys& key, SafetySettings& it) {
       "not checked");
   KEY(length_fault, from(0, 1), "the same: FAULT; 0: not checked");
   KEY(length_settling_s, above(0, 5), "for so long without interruption");
+  KEY(wrong_model_settling_s, from(0, 60),
+      "a parameter of the model observer at its limit for so long: FAULT; 0: not checked");
+  KEY(contact_force_n, from(0, 1e3),
+      "with estimation.observer: model, a sudden force on the arm above it is a contact; 0: not "
+      "checked");
+  KEY(contact_reaction, one_of({"hold", "vent", "yield"}),
+      "to a contact: HOLD, VENT, or yield: ACTIVE without compensating it");
+  KEY(contact_segment, from(0, kMaxSegments),
+      "the force of the model observer acts on the end of this segment; 0: the tip");
   KEY(deadman_timeout_s, above(0, 2), "without a go on lcm.deadman_channel: VENT");
 }
 
@@ -143,7 +152,7 @@ static void describe(Keys& key, RealtimeSettings& it) {
   KEY(lock_memory, "mlockall");
 }
 
-constinit const std::array<ChannelKey, 11> kChannelKeys = {{
+constinit const std::array<ChannelKey, 12> kChannelKeys = {{
     {"mocap_channel", &LcmSettings::mocap_channel, 1,
      "frames; left out: OPTITRACK_FRAMES for optitrack; VICON for rigid_transform, where it is "
      "what "
@@ -154,6 +163,8 @@ constinit const std::array<ChannelKey, 11> kChannelKeys = {{
     {"operator_channel", &LcmSettings::operator_channel, 1, "operator's commands"},
     {"status_channel", &LcmSettings::status_channel, 1, "controller status"},
     {"timing_channel", &LcmSettings::timing_channel, 1, "timing histograms"},
+    {"observer_channel", &LcmSettings::observer_channel, 1,
+     "what the model observer found, where there is one"},
     {"tick_channel", &LcmSettings::tick_channel, 0,
      "what every tick was given, for softarm replay; empty: not published"},
     {"valves_channel", &LcmSettings::valves_channel, 1, "status of the valves' driver"},

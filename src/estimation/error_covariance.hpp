@@ -149,6 +149,16 @@ class ErrorCovariance {
     return true;
   }
 
+  /// Multiplies `columns` (2g rows) by the inverse of the Cholesky factor of the disturbance's
+  /// covariance. Returns false, with nothing changed, where there is none.
+  template <class Columns>
+  bool whiten_disturbance(Columns& columns) noexcept {
+    factor_.compute(P_.block(disturbance(), disturbance(), dof_, dof_));
+    if (factor_.info() != Eigen::Success) return false;
+    factor_.matrixL().solveInPlace(columns);
+    return true;
+  }
+
  private:
   /// arm_: (u, v) after the step from (u, v) before; by_force_: from a constant force.
   bool transition(double h, const Model& model) noexcept {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <type_traits>
 
 #include "estimation/observer_state.hpp"
 #include "softarm/base/time.hpp"
@@ -54,6 +55,7 @@ void ModelObserver::update(const MocapFrame& frame, const CurvatureEstimate& est
   const bool usable = reference != nullptr && reference->u_rad.size() == 2 * n &&
                       reference->velocity_radps.size() == 2 * n &&
                       reference->acceleration_radps2.size() == 2 * n;
+  s.may_learn = learn;
   s.learns = s.settings.learn_parameters && usable && learn && !s.monitor.jump();
   s.ahead_is_stale = true;
   if (!s.advance_base(frame.capture_ns, usable ? reference : nullptr) || !s.correct(since_s))
@@ -102,6 +104,52 @@ const ModelCorrection& ModelObserver::correction() const noexcept { return state
 double ModelObserver::nis() const noexcept { return state_->nis; }
 bool ModelObserver::surprised() const noexcept { return state_->monitor.jump(); }
 bool ModelObserver::wrong_model() const noexcept { return state_->at_limit; }
+
+const SegmentVector& ModelObserver::newest_u_rad() const noexcept { return state_->base.u; }
+
+void ModelObserver::modelled_torque(std::int64_t time_ns, SegmentVector& tau_nm) noexcept {
+  State& s = *state_;
+  s.last.torque = s.base.torque;
+  if (s.running && time_ns > s.last.torque.time_ns)
+    s.history.advance(time_ns, s.last.torque, s.mean_torque);
+  tau_nm = s.last.torque.tau_nm;
+}
+
+bool ModelObserver::project_disturbance(Eigen::Ref<const Eigen::Matrix3Xd> jacobian,
+                                        ConstVectorRef disturbance_nm, Eigen::Matrix3d& information,
+                                        Eigen::Vector3d& weighted) const noexcept {
+  information.setZero();
+  weighted.setZero();
+  const bool factored = state_->for_groups([&](auto& errors, auto&, int first) {
+    using Errors = std::remove_cvref_t<decltype(errors)>;
+    using Columns = Eigen::Matrix<double, Eigen::Dynamic, 4, Eigen::ColMajor, Errors::kDof, 4>;
+    const int dof = errors.velocity();
+    Columns columns(dof, 4);
+    columns.template leftCols<3>() = jacobian.middleCols(2 * first, dof).transpose();
+    columns.col(3) = disturbance_nm.segment(2 * first, dof);
+    if (!errors.whiten_disturbance(columns)) return false;
+    information.noalias() +=
+        columns.template leftCols<3>().transpose() * columns.template leftCols<3>();
+    weighted.noalias() += columns.template leftCols<3>().transpose() * columns.col(3);
+    return true;
+  });
+  if (!factored) {
+    information.setZero();
+    weighted.setZero();
+  }
+  return factored;
+}
+
+void ModelObserver::report(ObserverReport& out) const noexcept {
+  out.segments = state_->arm.size();
+  out.running = running();
+  out.surprised = running() && surprised();
+  out.wrong_model = running() && wrong_model();
+  out.failures = failures();
+  out.nis = nis();
+  out.correction = correction();
+  deviation(out.deviation);
+}
 
 void ModelObserver::deviation(ModelCorrection& out) const noexcept {
   out.disturbance_nm.setZero(state_->arm.dof());

@@ -327,7 +327,7 @@ bool ModelObserver::State::correct(double since_s) noexcept {
   nis = square / components;
   limit_corrections();
   const bool got_over = monitor.add(nis, correction.disturbance_nm, since_s);
-  if (got_over && settings.learn_parameters) {
+  if (got_over && settings.learn_parameters && may_learn) {
     constexpr double kForgotten = 0.1;
     for_groups([&](auto& errors, auto&, int) {
       errors.add_to_parameters(kForgotten * kForgotten, settings.parameter_deviation);

@@ -75,7 +75,7 @@ struct ModelObserver::State {
   Motion last;   ///< and on to the instant asked for
   bool ahead_is_stale = true;
   ModelCorrection correction;
-  bool running = false, learns = false, at_limit = false;
+  bool running = false, may_learn = true, learns = false, at_limit = false;
   std::int64_t failures = 0;
   std::int64_t newest_ns = 0;
   double nis = 1.0;

@@ -74,6 +74,8 @@ bool StatusRecord::take(std::string_view channel, std::span<const std::byte> byt
       truth_.add(state);
   } else if (channel == lcm.timing_channel) {
     timing_received_ |= decode(bytes, timing_);
+  } else if (channel == lcm.observer_channel) {
+    take_observer(bytes);
   }
   write_rows(false);
   return is_status;
@@ -115,6 +117,15 @@ bool StatusRecord::take_status(std::span<const std::byte> bytes) {
   }
   waiting_.push_back({time_us, std::move(row)});
   return true;
+}
+
+/// It follows the status of the same tick.
+void StatusRecord::take_observer(std::span<const std::byte> bytes) {
+  if (!decode(bytes, observer_status_) ||
+      observer_status_.report.segments != experiment_.arm.size() || waiting_.empty() ||
+      observer_status_.time_us != status_.time_us)
+    return;
+  waiting_.back().row.observer = observer_status_.report;
 }
 
 void StatusRecord::write_rows(bool all) {

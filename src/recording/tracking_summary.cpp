@@ -48,6 +48,7 @@ void TrackingSummary::add(const LogRow& row, double period_s) {
   if (row.saturated) ++saturated_ticks_;
   if (std::isnan(active_since_s_)) active_since_s_ = row.t_s;
   add_tip(row);
+  if (row.observer && row.observer->running) add_observer(*row.observer);
   if (row.t_s - active_since_s_ < tracking_from_s_) return;
   add_tracking(row);
   add_elongation(row);
@@ -60,6 +61,21 @@ void TrackingSummary::add_elongation(const LogRow& row) {
     const double error_m = row.elongation_reference[i] - row.elongation_truth[i];
     elongation_[static_cast<std::size_t>(i)].add(error_m);
     elongation_max_m_ = std::max(elongation_max_m_, std::abs(error_m));
+  }
+}
+
+void TrackingSummary::add_observer(const ObserverReport& report) {
+  if (report.segments != segments_) return;
+  observer_ = report;
+  disturbance_.resize(static_cast<std::size_t>(segments_));
+  ++observed_ticks_;
+  surprised_ticks_ += report.surprised ? 1 : 0;
+  wrong_model_ticks_ += report.wrong_model ? 1 : 0;
+  nis_sum_ += report.nis;
+  for (int i = 0; i < segments_; ++i) {
+    const double size_nm = report.correction.disturbance_nm.segment<2>(2 * i).norm();
+    disturbance_[static_cast<std::size_t>(i)].add(size_nm);
+    disturbance_max_nm_ = std::max(disturbance_max_nm_, size_nm);
   }
 }
 
@@ -134,7 +150,7 @@ struct TrackingSummary::Json {
                {"u_rms_segment_rad", rms_of(of.u_of_segment_)},
                {"theta_rms_rad", rms_of(of.theta_)},
                {"phi_rms_rad", rms_of(of.phi_)},
-               {"tip_rms_m", of.tip_.since(-std::numeric_limits<double>::infinity()).rms()},
+               {"tip_rms_m", of.tip_rms_m()},
                {"tip_rms_second_half_m", of.tip_.since(half_s).rms()}};
     if (of.elongation_.front().count > 0) {
       json["elongation_rms_segment_m"] = rms_of(of.elongation_);
@@ -147,6 +163,34 @@ struct TrackingSummary::Json {
                                      : std::numeric_limits<double>::quiet_NaN();
     }
     return json;
+  }
+
+  static Value correction(const ModelCorrection& of, int segments) {
+    Value json{{"stiffness", Value::array()},
+               {"damping", Value::array()},
+               {"gain", Value::array()},
+               {"load", Value::array()}};
+    for (int i = 0; i < segments; ++i) {
+      const SegmentCorrection& segment = of.segment[static_cast<std::size_t>(i)];
+      json["stiffness"].push_back(segment.stiffness);
+      json["damping"].push_back(segment.damping);
+      json["gain"].push_back(segment.gain);
+      json["load"].push_back({segment.load.x(), segment.load.y()});
+    }
+    return json;
+  }
+
+  static Value observer(const TrackingSummary& of) {
+    const ObserverReport& newest = *of.observer_;
+    return {{"correction", correction(newest.correction, of.segments_)},
+            {"deviation", correction(newest.deviation, of.segments_)},
+            {"disturbance_rms_nm", rms_of(of.disturbance_)},
+            {"disturbance_max_nm", of.disturbance_max_nm_},
+            {"nis", of.nis()},
+            {"surprised_fraction", of.surprised_fraction()},
+            {"wrong_model_fraction",
+             static_cast<double>(of.wrong_model_ticks_) / static_cast<double>(of.observed_ticks_)},
+            {"failures", newest.failures}};
   }
 
   static Value modes(const TrackingSummary& of) {
@@ -186,6 +230,7 @@ std::string TrackingSummary::json() const {
                    {"saturated_fraction", saturated},
                    {"modes", Json::modes(*this)},
                    {"transitions", Json::transitions(*this)}};
+  if (observer_) json["observer"] = Json::observer(*this);
   if (frames_)
     json["frames"] = {{"accepted", frames_->accepted},
                       {"rejected", frames_->rejected()},
@@ -196,6 +241,37 @@ std::string TrackingSummary::json() const {
   return json.dump() + "\n";
 }
 
+std::string TrackingSummary::observer_table() const {
+  std::string text =
+      "observer: the arm relative to its model, with standard deviations; loads in g\n"
+      "segment      stiffness [%]        damping [%]           gain [%]   load x           load y  "
+      "          disturbance [N m rms]\n";
+  const auto pair = [](double value, double deviation, double unit, int digits) {
+    return fmt::format("{:+.{}f} +- {:.{}f}", unit * value, digits, unit * deviation, digits);
+  };
+  for (int i = 0; i < segments_; ++i) {
+    const auto index = static_cast<std::size_t>(i);
+    const SegmentCorrection& is = observer_->correction.segment[index];
+    const SegmentCorrection& sigma = observer_->deviation.segment[index];
+    text += fmt::format(
+        "{:>7}   {:>16}   {:>16}   {:>16}   {:>16} {:>16}   {:>8.4f}\n", i + 1,
+        pair(is.stiffness, sigma.stiffness, 100.0, 1), pair(is.damping, sigma.damping, 100.0, 1),
+        pair(is.gain, sigma.gain, 100.0, 1), pair(is.load.x(), sigma.load.x(), 1.0, 3),
+        pair(is.load.y(), sigma.load.y(), 1.0, 3), disturbance_[index].rms());
+  }
+  const auto percent = [this](std::int64_t ticks) {
+    return 100.0 * static_cast<double>(ticks) / static_cast<double>(observed_ticks_);
+  };
+  text += fmt::format("innovations {:.3f} of their covariance; surprised {:.2f} % of the time\n",
+                      nis(), percent(surprised_ticks_));
+  if (wrong_model_ticks_ > 0)
+    text += fmt::format(
+        "WRONG MODEL: a parameter stood at the limit of what a correction may be {:.2f} % of the "
+        "time\n",
+        percent(wrong_model_ticks_));
+  return text;
+}
+
 std::string TrackingSummary::tip_line() const {
   const std::string arrived =
       tip_last_far_s_ < tip_last_s_
@@ -204,8 +280,7 @@ std::string TrackingSummary::tip_line() const {
           : fmt::format("not within {:.0f} mm at the end", 1e3 * kTipNear_m);
   return fmt::format(
       "tip error {:.3f} mm rms, {:.3f} mm at most, from {:g} s after ACTIVE on; {}\n",
-      1e3 * tip_.since(-std::numeric_limits<double>::infinity()).rms(), 1e3 * tip_max_m_,
-      tracking_from_s_, arrived);
+      1e3 * tip_rms_m(), 1e3 * tip_max_m_, tracking_from_s_, arrived);
 }
 
 std::string TrackingSummary::table() const {
@@ -230,6 +305,7 @@ std::string TrackingSummary::table() const {
                         1e3 * elongation_max_m_);
   }
   if (tip_is_asked_) text += tip_line();
+  if (observer_) text += observer_table();
   if (frames_)
     text += fmt::format("frames: {} accepted, {} rejected, {} repeated, {} missing\n",
                         frames_->accepted, frames_->rejected() + late_frames_, frames_->repeated,

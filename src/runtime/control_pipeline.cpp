@@ -5,6 +5,7 @@
 
 #include "softarm/base/time.hpp"
 #include "softarm/estimation/model_observer.hpp"
+#include "softarm/model/actuation_matrix.hpp"
 #include "softarm/runtime/elongation_reference.hpp"
 #include "softarm/runtime/settings.hpp"
 
@@ -32,6 +33,11 @@ SegmentScalars elongation(const PipelineSettings& settings, double pressure_bar)
   return straight_elongation(settings.arm, settings.actuation, pressure_bar);
 }
 
+std::optional<ContactWatch> make_contact_watch(const PipelineSettings& settings) {
+  if (settings.estimation.observer != ObserverKind::model) return std::nullopt;
+  return ContactWatch(settings.arm, settings.safety);
+}
+
 }  // namespace
 
 ControlPipeline::ControlPipeline(const PipelineSettings& settings)
@@ -43,6 +49,7 @@ ControlPipeline::ControlPipeline(const PipelineSettings& settings)
       filter_(settings.estimation, settings.arm),
       observer_(make_observer(settings)),
       newest_frames_(observer_ ? NewestFrames::most(settings.arm.size(), period_s_) : 0),
+      contact_watch_(make_contact_watch(settings)),
       delay_ns_(observer_ ? to_ns(settings.control.dead_time_s) : 0),
       safety_(settings.safety, period_s_),
       activation_limit_(settings.safety),
@@ -67,6 +74,7 @@ ControlPipeline::ControlPipeline(const PipelineSettings& settings)
       commanded_tau_nm_(previous_tau_nm_),
       pressure_at_last_motion_bar_(previous_bar_) {
   seen_ns_.fill(kNever);
+  if (observer_) measured_tau_nm_ = modelled_tau_nm_ = previous_tau_nm_;
   output_.pressure_bar = previous_bar_;
 }
 
@@ -211,6 +219,7 @@ void ControlPipeline::watch(const TickInput& input, SafetyInput& safety) noexcep
   const bool waiting = safety_.mode() == Mode::wait_frames;
   safety.length_mismatch = length_watch_.out_of_tolerance() || (waiting && length_watch_.beyond());
   output_.length_warning = length_watch_.warns();
+  if (observer_) watch_contact(input, safety);
   if (!curvature_watch_.used()) return;
   // What is judged is the balance of an arm that is observed and commanded.
   const bool under_control = safety_.mode() == Mode::active || safety_.mode() == Mode::hold;
@@ -221,6 +230,46 @@ void ControlPipeline::watch(const TickInput& input, SafetyInput& safety) noexcep
     curvature_watch_.reset();
   }
   safety.curvature_mismatch = curvature_watch_.out_of_tolerance();
+}
+
+/// Judged where the arm is under control: elsewhere the disturbance is all that the model lacks.
+void ControlPipeline::watch_contact(const TickInput& input, SafetyInput& safety) noexcept {
+  output_.wrong_model = observer_->running() && observer_->wrong_model();
+  const bool under_control = safety_.mode() == Mode::active || safety_.mode() == Mode::hold;
+  if (!under_control || !output_.wrong_model) {
+    wrong_model_since_ns_ = kNever;
+  } else if (wrong_model_since_ns_ == kNever) {
+    wrong_model_since_ns_ = input.now_ns;
+  }
+  const double settling_s = settings_.safety.wrong_model_settling_s;
+  safety.wrong_model = settling_s > 0.0 && wrong_model_since_ns_ != kNever &&
+                       input.now_ns - wrong_model_since_ns_ >= to_ns(settling_s);
+  if (!under_control) contact_watch_->reset();
+  if (settings_.safety.valve_readback && under_control && input.measured_bar != nullptr &&
+      input.measured_bar->size() == previous_bar_.size()) {
+    constexpr double kMemory_s = 0.03;  // that of the disturbance after a jump
+    allocator_.torque(*input.measured_bar, measured_tau_nm_);
+    observer_->modelled_torque(input.now_ns, modelled_tau_nm_);
+    measured_tau_nm_ -= modelled_tau_nm_;
+    apply_actuation(settings_.arm, output_.motion.u_rad, measured_tau_nm_, modelled_tau_nm_);
+    if (missing_nm_.size() == 0) missing_nm_.setZero(modelled_tau_nm_.size());
+    missing_nm_ += std::min(1.0, period_s_ / kMemory_s) * (modelled_tau_nm_ - missing_nm_);
+  }
+  output_.contact = contact_watch_->contact();
+  const ContactReaction reaction = settings_.safety.contact_reaction;
+  safety.contact_holds = output_.contact && reaction == ContactReaction::hold;
+  safety.contact_vents = output_.contact && reaction == ContactReaction::vent;
+}
+
+/// What (17) compensates: nothing that pushes, where the arm is to yield.
+const ModelCorrection* ControlPipeline::correction() noexcept {
+  if (output_.observer == nullptr) return nullptr;
+  const ModelCorrection& found = output_.observer->correction();
+  if (!output_.contact || settings_.safety.contact_reaction != ContactReaction::yield)
+    return &found;
+  yielding_ = found;
+  yielding_.disturbance_nm = contact_watch_->slow_disturbance_nm();
+  return &yielding_;
 }
 
 /// Of the newest accepted frame. The filter takes every frame, the observer, which costs more, those
@@ -259,7 +308,10 @@ void ControlPipeline::use_frame(bool too_many) noexcept {
 
 void ControlPipeline::observe(const MocapFrame& frame, const CurvatureEstimate& estimate,
                               const KnownMotion* expected) noexcept {
-  observer_->update(frame, estimate, expected, !output_.saturated);
+  const bool learn = !output_.saturated && !contact_watch_->contact();
+  observer_->update(frame, estimate, expected, learn);
+  if (expected != nullptr || safety_.mode() == Mode::hold)
+    contact_watch_->judge(frame.capture_ns, *observer_, missing_nm_);
 }
 
 void ControlPipeline::predict(std::int64_t now_ns, std::int64_t at_ns) noexcept {
@@ -298,7 +350,7 @@ void ControlPipeline::control(std::int64_t act_ns) noexcept {
   reference_.window(seconds(act_ns + ahead_ns), lookahead_s, window_);
   if (elongation_) elongation_->advance(seconds(act_ns + ahead_ns), lookahead_s, window_);
   controller_.compute(output_.motion.u_rad, output_.motion.velocity_radps, window_, control_,
-                      output_.observer != nullptr ? &output_.observer->correction() : nullptr);
+                      correction());
   if (elongation_) elongation_->hold_constant_lengths(control_.tau_actuation_nm);
   allocator_.allocate(control_.tau_actuation_nm, allocation_);
   controller_.integrate(period_s_, output_.motion.u_rad, window_.now, allocation_.scale);
@@ -332,6 +384,15 @@ void ControlPipeline::limit(Mode mode) noexcept {
     output_.tau_actuation_nm.resize(0);
   }
   previous_bar_ = output_.pressure_bar;
+}
+
+void ControlPipeline::report(ObserverReport& out) const noexcept {
+  if (!observer_) return;
+  observer_->report(out);
+  out.force_n = contact_watch_->force_n();
+  out.force_covariance_n2 = contact_watch_->covariance_n2();
+  out.contact = contact_watch_->contact();
+  out.pressure_loss = contact_watch_->pressure_loss();
 }
 
 bool ControlPipeline::poses_frozen(std::int64_t now_ns) const noexcept {

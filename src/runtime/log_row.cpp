@@ -23,6 +23,10 @@ void fill_from_pipeline(const ControlPipeline& pipeline, const ArmParameters& ar
   row.residual_length =
       Eigen::Map<const Eigen::VectorXd>(estimate.length_error_m.data(), arm.size());
   row.commanded = output.pressure_bar;
+  if (pipeline.has_observer()) {
+    if (!row.observer) row.observer.emplace();
+    pipeline.report(*row.observer);
+  }
   row.tip_reference.reset();
   row.tip_is_asked = row.reference.size() > 0 && output.reference.has_tip;
   if (row.tip_is_asked) {

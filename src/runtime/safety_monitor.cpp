@@ -62,6 +62,8 @@ constexpr std::array kCauses{
           [](const Evidence& e) { return e.input.pressure_mismatch && e.pressurised(); }},
     Cause{{Reason::curvature_mismatch, Mode::fault, Clearance::disarm_then_arm},
           [](const Evidence& e) { return e.input.curvature_mismatch; }},
+    Cause{{Reason::wrong_model, Mode::fault, Clearance::disarm_then_arm},
+          [](const Evidence& e) { return e.input.wrong_model; }},
     Cause{{Reason::length_mismatch, Mode::fault, Clearance::disarm_then_arm},
           [](const Evidence& e) { return e.input.length_mismatch && e.pressurised(); }},
     Cause{{Reason::disarmed, Mode::vent, Clearance::arm},
@@ -80,6 +82,8 @@ constexpr std::array kCauses{
           [](const Evidence& e) { return e.input.activated_too_often; }},
     Cause{{Reason::oscillation, Mode::vent, Clearance::arm},
           [](const Evidence& e) { return e.input.oscillation; }},
+    Cause{{Reason::contact_vented, Mode::vent, Clearance::arm},
+          [](const Evidence& e) { return e.input.contact_vents; }},
     Cause{{Reason::valves_silent, Mode::vent, Clearance::good_frames},
           [](const Evidence& e) { return e.valves_silent(); }},
     Cause{{Reason::pressure_mismatch, Mode::vent, Clearance::good_frames},
@@ -109,6 +113,8 @@ constexpr std::array kCauses{
           }},
     Cause{{Reason::poses_frozen, Mode::hold, Clearance::good_frames},
           [](const Evidence& e) { return e.input.poses_frozen; }},
+    Cause{{Reason::contact, Mode::hold, Clearance::good_frames},
+          [](const Evidence& e) { return e.input.contact_holds; }},
     Cause{{Reason::overruns, Mode::hold, Clearance::good_frames},
           [](const Evidence& e) {
             return e.settings.hold_overruns > 0 &&
@@ -175,7 +181,10 @@ const char* name(Reason reason) noexcept {
                               "requests_lost",
                               "frames_refused",
                               "frame_period_mismatch",
-                              "activated_too_often"};
+                              "activated_too_often",
+                              "wrong_model",
+                              "contact",
+                              "contact_vented"};
   static_assert(kNames.size() == static_cast<std::size_t>(kReasons));
   return name_of(reason, kNames);
 }

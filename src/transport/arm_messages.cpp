@@ -77,6 +77,44 @@ bool decode(std::span<const std::byte> bytes, ArmStatus& out) {
   return true;
 }
 
+bool decode(std::span<const std::byte> bytes, ObserverStatus& out) {
+  using Message = softarm_messages::observer_status_t;
+  Message message;
+  if (!decode(bytes, message)) return false;
+  const auto has = [&](std::int16_t flag) { return (message.flags & flag) != 0; };
+  ObserverReport& report = out.report;
+  out.time_us = message.time_us;
+  out.tick = message.tick;
+  report.segments = message.num_segments;
+  report.running = has(Message::RUNNING);
+  report.surprised = has(Message::SURPRISED);
+  report.wrong_model = has(Message::WRONG_MODEL);
+  report.contact = has(Message::CONTACT);
+  report.pressure_loss = has(Message::PRESSURE_LOSS);
+  report.failures = message.failures;
+  report.nis = static_cast<double>(message.nis);
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    report.force_n[i] = static_cast<double>(message.force_n[i]);
+    for (Eigen::Index j = 0; j < 3; ++j)
+      report.force_covariance_n2(i, j) = static_cast<double>(message.force_covariance_n2[i][j]);
+  }
+  const auto take = [&](const auto& stiffness, const auto& damping, const auto& gain,
+                        const auto& load, const auto& disturbance_nm, ModelCorrection& into) {
+    for (std::size_t i = 0; i < stiffness.size(); ++i)
+      into.segment[i] = {
+          .stiffness = static_cast<double>(stiffness[i]),
+          .damping = static_cast<double>(damping[i]),
+          .gain = static_cast<double>(gain[i]),
+          .load = {static_cast<double>(load[i][0]), static_cast<double>(load[i][1])}};
+    flatten(disturbance_nm, into.disturbance_nm);
+  };
+  take(message.stiffness, message.damping, message.gain, message.load, message.disturbance_nm,
+       report.correction);
+  take(message.stiffness_deviation, message.damping_deviation, message.gain_deviation,
+       message.load_deviation, message.disturbance_deviation_nm, report.deviation);
+  return true;
+}
+
 bool decode(std::span<const std::byte> bytes, PlantState& out) {
   softarm_messages::plant_state_t message;
   if (!decode(bytes, message)) return false;

@@ -278,6 +278,9 @@ void DaemonLink::publish_status(std::int64_t now_ns, const ControlPipeline& pipe
   status.overruns = counter(timing.overruns);
   status.messages_malformed = counter(malformed_);
   if (!node_.publish(lcm_.status_channel, status)) ++unsent_;
+  if (!messages_.set_observer(timing.ticks, pipeline)) return;
+  messages_.observer.time_us = status.time_us;
+  if (!node_.publish(lcm_.observer_channel, messages_.observer)) ++unsent_;
 }
 
 void DaemonLink::publish_record(const TickInput& input, const TickOutput& output) noexcept {

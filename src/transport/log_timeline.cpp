@@ -34,8 +34,8 @@ LogTimeline::LogTimeline(const TransportSettings& transport)
   sources_ = {
       {lcm.command_channel, kSecond, 1000, true}, {lcm.measurement_channel, kSecond, 1000, true},
       {lcm.status_channel, kFirst, 1000, true},   {lcm.timing_channel, kFirst, 1000, true},
-      {lcm.valves_channel, kFirst, 1000, true},   {lcm.plant_channel, kFirst, 1000, true},
-      {lcm.tick_channel, kFourth, 1, true}};
+      {lcm.observer_channel, kFirst, 1000, true}, {lcm.valves_channel, kFirst, 1000, true},
+      {lcm.plant_channel, kFirst, 1000, true},    {lcm.tick_channel, kFourth, 1, true}};
   for (const std::string& channel : mocap_channels(transport))
     sources_.push_back({channel, 0, 1000, false});
 }

@@ -137,6 +137,12 @@ bool decode(std::span<const std::byte> bytes, softarm_messages::timing_t& messag
   return decode_exactly(bytes, kHash + 3 * 8 + 4 * 32 * 4 + 4 * 4, message);
 }
 
+bool decode(std::span<const std::byte> bytes,
+            softarm_messages::observer_status_t& message) noexcept {
+  constexpr std::size_t kBefore = 2 * 8 + 2 + 4 + 4 + 3 * 4 + 9 * 4, kSegment = 14 * 4;
+  return decode_list(bytes, kBefore, kSegment, kMaxSegments, message);
+}
+
 bool decode(std::span<const std::byte> bytes, softarm_messages::tick_record_t& message) noexcept {
   constexpr std::size_t kCounts = kHash + 7 * 8 + 4 + 8;  // numbers and flags come first
   const int chambers = bounded(length16_at(bytes, kCounts), kMaxChambers);

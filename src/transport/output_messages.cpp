@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include "softarm/runtime/settings.hpp"
@@ -55,6 +56,7 @@ OutputMessages::OutputMessages(const PipelineSettings& settings, const Provenanc
     : pressure_command{},
       torque_command{},
       status{},
+      observer{},
       width_(settings.arm.segment_dof()),
       by_torque_(settings.actuation.kind == ActuationKind::torque) {
   const auto segments = static_cast<std::size_t>(settings.arm.size());
@@ -82,11 +84,21 @@ OutputMessages::OutputMessages(const PipelineSettings& settings, const Provenanc
        {&status.phi_rad, &status.theta_rad, &status.residual_twist_rad, &status.residual_length_m})
     list->assign(segments, 0.0F);
   status.pressure_bar.assign(chambers, 0.0F);
-  if (!settings.arm.extensible) return;
-  status.num_stretching = status.num_segments;
-  for (auto* list : {&status.elongation_m, &status.elongation_rate_mps,
-                     &status.reference_elongation_m, &status.axial_force_n})
+  if (settings.arm.extensible) {
+    status.num_stretching = status.num_segments;
+    for (auto* list : {&status.elongation_m, &status.elongation_rate_mps,
+                       &status.reference_elongation_m, &status.axial_force_n})
+      list->assign(segments, 0.0F);
+  }
+  if (settings.estimation.observer != ObserverKind::model) return;
+  observer.num_segments = status.num_segments;
+  for (auto* list :
+       {&observer.stiffness, &observer.damping, &observer.gain, &observer.stiffness_deviation,
+        &observer.damping_deviation, &observer.gain_deviation})
     list->assign(segments, 0.0F);
+  for (auto* pairs : {&observer.load, &observer.disturbance_nm, &observer.load_deviation,
+                      &observer.disturbance_deviation_nm})
+    pairs->assign(segments, std::vector<float>(2));
 }
 
 void OutputMessages::set_command(std::int64_t tick, const TickOutput& output) noexcept {
@@ -131,6 +143,44 @@ void OutputMessages::set_status(std::int64_t tick, const ControlPipeline& pipeli
     status.residual_length_m[i] = static_cast<float>(estimate.length_error_m[i]);
   }
   status.pressure_bar = pressure_command.pressure_bar;
+}
+
+bool OutputMessages::set_observer(std::int64_t tick, const ControlPipeline& pipeline) noexcept {
+  using Message = softarm_messages::observer_status_t;
+  if (!pipeline.has_observer()) return false;
+  pipeline.report(report_);
+  const std::pair<bool, std::int16_t> flags[] = {{report_.running, Message::RUNNING},
+                                                 {report_.surprised, Message::SURPRISED},
+                                                 {report_.wrong_model, Message::WRONG_MODEL},
+                                                 {report_.contact, Message::CONTACT},
+                                                 {report_.pressure_loss, Message::PRESSURE_LOSS}};
+  observer.tick = tick;
+  observer.flags = 0;
+  for (const auto& [set, flag] : flags)
+    if (set) observer.flags = static_cast<std::int16_t>(observer.flags | flag);
+  observer.failures = counter(report_.failures);
+  observer.nis = static_cast<float>(report_.nis);
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    observer.force_n[i] = static_cast<float>(report_.force_n[i]);
+    for (Eigen::Index j = 0; j < 3; ++j)
+      observer.force_covariance_n2[i][j] = static_cast<float>(report_.force_covariance_n2(i, j));
+  }
+  const auto put = [](const ModelCorrection& from, auto& stiffness, auto& damping, auto& gain,
+                      auto& load, auto& disturbance_nm) {
+    for (std::size_t i = 0; i < stiffness.size(); ++i) {
+      stiffness[i] = static_cast<float>(from.segment[i].stiffness);
+      damping[i] = static_cast<float>(from.segment[i].damping);
+      gain[i] = static_cast<float>(from.segment[i].gain);
+      load[i][0] = static_cast<float>(from.segment[i].load.x());
+      load[i][1] = static_cast<float>(from.segment[i].load.y());
+    }
+    put_pairs(from.disturbance_nm, disturbance_nm);
+  };
+  put(report_.correction, observer.stiffness, observer.damping, observer.gain, observer.load,
+      observer.disturbance_nm);
+  put(report_.deviation, observer.stiffness_deviation, observer.damping_deviation,
+      observer.gain_deviation, observer.load_deviation, observer.disturbance_deviation_nm);
+  return true;
 }
 
 }  // namespace softarm

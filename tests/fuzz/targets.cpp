@@ -19,6 +19,7 @@ const std::vector<FuzzTarget>& fuzz_targets() {
       decoder<timing_t>(),
       decoder<tick_record_t>(),
       decoder<valves_status_t>(),
+      decoder<observer_status_t>(),
       decoder<rigid_transform_t>(),
       {"optitrack_frame_t", run_optitrack, optitrack_seeds, decoder_words, 2048, 10'000'000},
       {"mocap_sources", run_mocap, mocap_seeds, decoder_words, 2048, 10'000'000},

@@ -1,4 +1,6 @@
 // softarm-dev bench robustness: arms that are not their model, under five control laws.
+#include <fmt/format.h>
+
 #include <cstdio>
 #include <memory>
 #include <string>
@@ -6,6 +8,7 @@
 
 #include "apps/program.hpp"
 #include "apps/progress.hpp"
+#include "dev/bench/robustness_draws.hpp"
 #include "dev/bench/robustness_scenes.hpp"
 #include "dev/commands.hpp"
 #include "softarm/config/load.hpp"
@@ -16,7 +19,9 @@ namespace {
 struct RobustnessOptions {
   int seeds = 5;
   std::string scene, law;
-  bool json = false;
+  bool json = false, processes = false;
+  int draws = 0;
+  std::uint64_t seed = 1;
 };
 
 Experiment shipped_config(const std::string& name) {
@@ -39,21 +44,45 @@ void join(RobustnessTrial& worst, const RobustnessTrial& other) {
   worst.stayed_active &= other.stayed_active;
 }
 
+void search(const RobustnessOptions& options) {
+  const DrawLimits limits;
+  Progress progress(true);
+  const std::vector<Draw> draws =
+      run_draws(limits, options.draws, options.seed, shipped_config, [&](int done) {
+        if (progress.due()) progress.update(fmt::format("{} of {}", done, options.draws));
+      });
+  const std::string text = options.json ? draws_json(limits, draws) : draws_table(limits, draws);
+  std::fwrite(text.data(), 1, text.size(), stdout);
+}
+
+/// The law of the rows over LCM, if none is asked for.
+bool is_asked(const RobustnessOptions& options, RobustnessLaw law) {
+  if (!options.law.empty()) return options.law == name(law);
+  return !options.processes || law == RobustnessLaw::observer_parameters;
+}
+
 void measure_robustness(const RobustnessOptions& options) {
   std::vector<RobustnessRow> rows;
-  const std::vector<ObserverCost> costs = observer_costs();
+  const std::vector<ObserverCost> costs =
+      options.processes ? std::vector<ObserverCost>() : observer_costs();
+  const auto trial = [&](const Experiment& experiment, const RobustnessScene& scene, int seed) {
+    const auto number = static_cast<std::uint64_t>(seed);
+    return options.processes ? run_processes(experiment, scene, number)
+                             : run(experiment, scene, number);
+  };
   {
     Progress progress(true);
     for (const RobustnessScene& scene : robustness_scenes()) {
       if (scene.name.find(options.scene) == std::string::npos) continue;
+      if (options.processes && needs_lock_step(scene)) continue;
       RobustnessRow& row = rows.emplace_back(RobustnessRow{scene.name, scene.bound_mrad, {}});
       for (const RobustnessLaw law : kRobustnessLaws) {
-        if (!options.law.empty() && options.law != name(law)) continue;
+        if (!is_asked(options, law)) continue;
         progress.update(scene.name + ": " + name(law));
         const Experiment experiment = robustness_experiment(scene, law, shipped_config);
-        RobustnessTrial worst = run(experiment, scene, 1);
+        RobustnessTrial worst = trial(experiment, scene, 1);
         for (int seed = 2; seed <= options.seeds; ++seed)
-          join(worst, run(experiment, scene, static_cast<std::uint64_t>(seed)));
+          join(worst, trial(experiment, scene, seed));
         row.cells.push_back({law, worst});
       }
     }
@@ -76,7 +105,21 @@ void add_bench_robustness_command(CLI::App& group) {
   std::vector<std::string> laws;
   for (const RobustnessLaw law : kRobustnessLaws) laws.emplace_back(name(law));
   command->add_option("--law", options->law, "only this one")->check(CLI::IsMember(laws));
-  command->callback([options] { measure_robustness(*options); });
+  CLI::Option* processes = command->add_flag(
+      "--processes", options->processes,
+      "with softarmd and softarm-plant over LCM, in real time: one run of every scene that a "
+      "configuration describes, with the observer and its parameters unless --law asks for "
+      "another");
+  command
+      ->add_option("--draws", options->draws,
+                   "instead: so many arms drawn at random, with the observer and its parameters")
+      ->check(CLI::Range(1, 100'000))
+      ->excludes(processes);
+  command->add_option("--seed", options->seed, "of the arms drawn")->check(CLI::NonNegativeNumber);
+  command->callback([options, command] {
+    if (options->processes && command->count("--seeds") == 0) options->seeds = 1;
+    options->draws > 0 ? search(*options) : measure_robustness(*options);
+  });
 }
 
 }  // namespace softarm

@@ -12,6 +12,7 @@
 
 #include "softarm/estimation/curvature_estimator.hpp"
 #include "softarm/estimation/curvature_filter.hpp"
+#include "softarm/estimation/observer_report.hpp"
 #include "softarm/estimation/settings.hpp"
 #include "softarm/model/model_correction.hpp"
 
@@ -89,6 +90,20 @@ class ModelObserver {
   bool surprised() const noexcept;
   /// A parameter stands at the limit of what is taken for a correction of the model.
   bool wrong_model() const noexcept;
+  /// u (2n, rad) at the newest frame.
+  const SegmentVector& newest_u_rad() const noexcept;
+  /// tau_A (2n, N m) behind the valves at `time_ns`, as it follows from the commands.
+  void modelled_torque(std::int64_t time_ns, SegmentVector& tau_nm) noexcept;
+  /// Of a disturbance d (2n, N m) that is thought to be J^T F: the information J P^-1 J^T about F and
+  /// J P^-1 d, with P the covariance of the estimated disturbance. O(n) above kJointSegments.
+  /// @param jacobian J, 3 x 2n, m
+  /// @return false, with both zero, where P cannot be factored
+  bool project_disturbance(Eigen::Ref<const Eigen::Matrix3Xd> jacobian,
+                           ConstVectorRef disturbance_nm, Eigen::Matrix3d& information,
+                           Eigen::Vector3d& weighted) const noexcept;
+
+  /// All of the above for a status; its force and what follows from it stay as they were.
+  void report(ObserverReport& out) const noexcept;
 
  private:
   struct State;

@@ -39,6 +39,10 @@ class HorizontalLoad {
   void rows(ConstVectorRef u, DynamicsWorkspace& workspace, VectorRef along_x,
             VectorRef along_y) const noexcept;
 
+  /// |g| e_x and |g| e_y, world frame.
+  const Eigen::Vector3d& gravity_x_mps2() const noexcept { return arm_x_.gravity_mps2; }
+  const Eigen::Vector3d& gravity_y_mps2() const noexcept { return arm_y_.gravity_mps2; }
+
  private:
   ArmParameters arm_x_, arm_y_;
 };

@@ -57,6 +57,9 @@ class StatusRecord {
   /// The summary at the end of a run, for a person.
   std::string table() const;
 
+  /// Of all rows that were complete; after close() of all.
+  const TrackingSummary& summary() const { return summary_; }
+
   /// The newest status.
   const ArmStatus& status() const { return status_; }
   /// Time from the first status to the newest, in s.
@@ -72,6 +75,7 @@ class StatusRecord {
     LogRow row;
   };
   bool take_status(std::span<const std::byte> bytes);
+  void take_observer(std::span<const std::byte> bytes);
   /// The rows that are complete, or all of them.
   void write_rows(bool all);
   /// Does what writes to a file; afterwards failure() is why it could not.
@@ -88,7 +92,8 @@ class StatusRecord {
   TruthTrack truth_;
   std::deque<WaitingRow> waiting_;
   ArmStatus status_;
-  bool commander_heard_ = false;  ///< the newest status was not of a shadow
+  ObserverStatus observer_status_;  ///< the newest
+  bool commander_heard_ = false;    ///< the newest status was not of a shadow
   softarm_messages::timing_t timing_{};
   bool timing_received_ = false;
   std::int64_t start_us_ = 0;

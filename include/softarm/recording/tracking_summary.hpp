@@ -58,6 +58,21 @@ class TrackingSummary {
   /// The changes of mode in order, the first kMaxTransitions of them.
   const std::vector<Transition>& transitions() const { return transitions_; }
 
+  /// Root mean square and largest error of a component of u (rad), of the tip (m); NaN where there
+  /// was none.
+  double u_rms_rad() const { return u_.rms(); }
+  double u_max_rad() const { return u_max_rad_; }
+  double tip_rms_m() const { return tip_.since(-std::numeric_limits<double>::infinity()).rms(); }
+  /// Of a model-based observer in ACTIVE: the mean of its innovations' squares, a component, and the
+  /// part of the time in which they were too large; NaN where there was none.
+  double nis() const { return nis_sum_ / static_cast<double>(observed_ticks_); }
+  double surprised_fraction() const {
+    return static_cast<double>(surprised_ticks_) / static_cast<double>(observed_ticks_);
+  }
+
+  /// The newest report of a model-based observer in ACTIVE, if there was one.
+  const std::optional<ObserverReport>& observer() const { return observer_; }
+
   /// The summary as a table for a person.
   std::string table() const;
 
@@ -95,6 +110,8 @@ class TrackingSummary {
   struct Json;  ///< makes the parts of json()
   void add_tracking(const LogRow& row);
   void add_elongation(const LogRow& row);
+  void add_observer(const ObserverReport& report);
+  std::string observer_table() const;
   void add_tip(const LogRow& row);
   std::string tip_line() const;
 
@@ -116,6 +133,10 @@ class TrackingSummary {
   bool tip_is_asked_ = false;    ///< the reference was a path of the tip
   double tip_last_far_s_ = 0.0;  ///< after the latest ACTIVE: when the tip was last kTipNear_m off
   double tip_last_s_ = 0.0;
+  std::optional<ObserverReport> observer_;
+  std::vector<MeanSquare> disturbance_;  ///< of every segment, N m
+  double disturbance_max_nm_ = 0.0, nis_sum_ = 0.0;
+  std::int64_t observed_ticks_ = 0, surprised_ticks_ = 0, wrong_model_ticks_ = 0;
   double command_max_ = 0.0;  ///< bar, or N m
   bool torques_ = false;
   std::array<double, 6> mode_s_{};

@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <span>
 
 #include "softarm/actuation/pressure_allocator.hpp"
@@ -18,7 +19,9 @@
 #include "softarm/control/reference.hpp"
 #include "softarm/estimation/curvature_filter.hpp"
 #include "softarm/estimation/frame_validator.hpp"
+#include "softarm/estimation/observer_report.hpp"
 #include "softarm/runtime/activation_limit.hpp"
+#include "softarm/runtime/contact_watch.hpp"
 #include "softarm/runtime/following.hpp"
 #include "softarm/runtime/newest_frames.hpp"
 #include "softarm/runtime/safety_monitor.hpp"
@@ -65,6 +68,8 @@ struct TickOutput {
   bool soft_limit = false;      ///< the arm is beyond max_theta_rad or max_speed_radps
   bool bounded = false;         ///< the controller bounded something near a singularity
   bool length_warning = false;  ///< a segment is not as long as configured
+  bool wrong_model = false;     ///< a parameter of the model-based observer stands at its limit
+  bool contact = false;         ///< something pushes the arm
   std::int64_t frame_number = -1;  ///< newest accepted frame
   /// Why the newest frame was refused; `accepted` where it was not.
   FrameVerdict refusal = FrameVerdict::accepted;
@@ -105,6 +110,10 @@ class ControlPipeline {
   std::int64_t frames_left_out() const noexcept { return newest_frames_.left_out(); }
   /// u and residuals of the newest accepted frame.
   const CurvatureEstimate& estimate() const noexcept { return validator_.estimate(); }
+  /// Whether there is a model-based observer.
+  bool has_observer() const noexcept { return observer_ != nullptr; }
+  /// What it knows after the latest tick; `out` stays as it was where there is none.
+  void report(ObserverReport& out) const noexcept;
   /// Every commanded pressure is zero.
   bool fully_vented() const noexcept { return output_.pressure_bar.isZero(0.0); }
   /// Period of the tick, 1/rate_hz.
@@ -114,6 +123,8 @@ class ControlPipeline {
   void forget_command() noexcept;
   void validate_and_estimate(const TickInput& input, SafetyInput& safety) noexcept;
   void watch(const TickInput& input, SafetyInput& safety) noexcept;
+  void watch_contact(const TickInput& input, SafetyInput& safety) noexcept;
+  const ModelCorrection* correction() noexcept;
   void use_frame(bool too_many) noexcept;
   void observe(const MocapFrame& frame, const CurvatureEstimate& estimate,
                const KnownMotion* expected) noexcept;
@@ -133,7 +144,13 @@ class ControlPipeline {
   CurvatureFilter filter_;
   std::unique_ptr<ModelObserver> observer_;  ///< where it is configured
   NewestFrames newest_frames_;               ///< that it takes of too many in one tick
-  std::int64_t delay_ns_;                    ///< that they and the controller look ahead by
+  std::optional<ContactWatch> contact_watch_;
+  SegmentVector measured_tau_nm_, modelled_tau_nm_;  ///< scratch
+  SegmentVector
+      missing_nm_;  ///< generalized force that measured pressures lack; empty: not measured
+  std::int64_t wrong_model_since_ns_ = kNever;
+  ModelCorrection yielding_;  ///< the correction without what pushes
+  std::int64_t delay_ns_;     ///< that they and the controller look ahead by
   SafetyMonitor safety_;
   ActivationLimit activation_limit_;
   std::int64_t answer_ns_;  ///< in which a command that moved must show in frames that are not late

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "softarm/actuation/pressure_allocator.hpp"
+#include "softarm/estimation/observer_report.hpp"
 #include "softarm/model/arm.hpp"
 #include "softarm/runtime/control_pipeline.hpp"
 #include "softarm/runtime/safety_monitor.hpp"
@@ -27,6 +28,7 @@ struct LogRow {
   std::optional<Eigen::Vector3d> tip, tip_reference;  ///< m, world
   bool tip_is_asked =
       false;  ///< tip_reference is a path of the tip (22), not the model's tip at u_ref
+  std::optional<ObserverReport> observer;  ///< where there is a model-based one
   Eigen::VectorXd coordinates;  ///< of the simulated arm's segments, pieces or joints, rad
 };
 

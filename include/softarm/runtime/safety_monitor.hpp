@@ -50,9 +50,12 @@ enum class Reason : std::int8_t {
   requests_lost,
   frames_refused,  ///< frames_late or frames_stale, where frames come but are refused
   frame_period_mismatch,
-  activated_too_often
+  activated_too_often,
+  wrong_model,
+  contact,        ///< that HOLD answers
+  contact_vented  ///< that VENT answers
 };
-inline constexpr int kReasons = static_cast<int>(Reason::activated_too_often) + 1;
+inline constexpr int kReasons = static_cast<int>(Reason::contact_vented) + 1;
 
 /// As above, in static storage; "unknown" for a value outside the enumeration.
 const char* name(Mode mode) noexcept;
@@ -120,6 +123,9 @@ struct SafetyInput {
   bool curvature_mismatch = false;              ///< the arm is not where its pressures would put it
   bool oscillation = false;            ///< the arm swings about its reference and does not stop
   bool length_mismatch = false;        ///< the arm is not as long as configured
+  bool wrong_model = false;            ///< what was learnt of the arm is no correction of its model
+  bool contact_holds = false;          ///< something pushes the arm, and HOLD is to answer that
+  bool contact_vents = false;          ///< the same, and VENT
   bool paused = false;                 ///< the clock stood still since the last tick
   bool command_expired = false;        ///< the last command expired: the valves have vented
   bool deadman_used = false;           ///< there is a dead-man input

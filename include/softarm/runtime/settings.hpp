@@ -15,6 +15,13 @@ enum class Arming {
   explicit_   ///< waits for an operator's `arm`
 };
 
+/// What a contact leads to.
+enum class ContactReaction {
+  hold,  ///< HOLD until it has gone
+  vent,  ///< VENT until an operator arms again
+  yield  ///< ACTIVE, but what pushes is not compensated: the arm is as soft as K + K_P
+};
+
 /// Thresholds of the safety monitor; zero for a time means "derive from control and frame period".
 struct SafetySettings {
   Arming arming = Arming::automatic;
@@ -41,7 +48,11 @@ struct SafetySettings {
   double length_warning = 0.05;
   double length_fault = 0.1;
   double length_settling_s = 0.5;
-  bool deadman = false;  ///< there is a dead-man input
+  double wrong_model_settling_s = 1.0;
+  double contact_force_n = 0.0;
+  ContactReaction contact_reaction = ContactReaction::hold;
+  int contact_segment = 0;  ///< 0: the tip
+  bool deadman = false;     ///< there is a dead-man input
   double deadman_timeout_s = 0.2;
   /// How long a command is valid: the valve side vents by itself unless a newer one arrives.
   double command_validity_s = 0.1;

@@ -9,6 +9,7 @@
 
 #include "softarm/actuation/pressure_allocator.hpp"
 #include "softarm/estimation/frame_validator.hpp"
+#include "softarm/estimation/observer_report.hpp"
 #include "softarm/model/arm.hpp"
 #include "softarm/runtime/safety_monitor.hpp"
 
@@ -67,6 +68,13 @@ struct ArmStatus {
   std::string text() const;
 };
 
+/// What the model-based observer knows in one tick (observer_status_t).
+struct ObserverStatus {
+  std::int64_t time_us = 0;  ///< the daemon's monotonic clock at the tick
+  std::int64_t tick = 0;
+  ObserverReport report;
+};
+
 /// True state of a simulated arm (plant_state_t), which no sensor of a real arm measures
 /// completely.
 struct PlantState {
@@ -93,6 +101,8 @@ struct ChamberCommand {
 /// Decodes one controller_status_t as message_decoding.hpp does: returns false, and leaves `out`
 /// unspecified, unless `bytes` are exactly one message of the type. Values are not checked.
 bool decode(std::span<const std::byte> bytes, ArmStatus& out);
+/// The same of an observer_status_t.
+bool decode(std::span<const std::byte> bytes, ObserverStatus& out);
 /// The same of a plant_state_t.
 bool decode(std::span<const std::byte> bytes, PlantState& out);
 /// The same of a pressure_command_t, or of a torque_command_t where `by_torque`.

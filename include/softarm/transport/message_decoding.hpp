@@ -7,6 +7,7 @@
 #include <softarm_messages/curvature_reference_t.hpp>
 #include <softarm_messages/deadman_t.hpp>
 #include <softarm_messages/mocap_frame_t.hpp>
+#include <softarm_messages/observer_status_t.hpp>
 #include <softarm_messages/operator_command_t.hpp>
 #include <softarm_messages/plant_state_t.hpp>
 #include <softarm_messages/pressure_command_t.hpp>
@@ -50,6 +51,9 @@ bool decode(std::span<const std::byte> bytes,
 bool decode(std::span<const std::byte> bytes, softarm_messages::plant_state_t& message) noexcept;
 /// Decodes a timing_t.
 bool decode(std::span<const std::byte> bytes, softarm_messages::timing_t& message) noexcept;
+/// Decodes an observer_status_t.
+bool decode(std::span<const std::byte> bytes,
+            softarm_messages::observer_status_t& message) noexcept;
 /// Decodes a tick_record_t.
 bool decode(std::span<const std::byte> bytes, softarm_messages::tick_record_t& message) noexcept;
 /// Decodes a valves_status_t.

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <softarm_messages/controller_status_t.hpp>
+#include <softarm_messages/observer_status_t.hpp>
 #include <softarm_messages/pressure_command_t.hpp>
 #include <softarm_messages/torque_command_t.hpp>
 #include <string>
@@ -36,15 +37,20 @@ class OutputMessages {
   /// does not know. The command of the same tick must have been set.
   void set_status(std::int64_t tick, const ControlPipeline& pipeline) noexcept;
 
+  /// Fills what the model-based observer knows, except `time_us`. @return whether there is one
+  bool set_observer(std::int64_t tick, const ControlPipeline& pipeline) noexcept;
+
   /// Whether commands are torques: another type, which no valve terminal decodes.
   bool by_torque() const noexcept { return by_torque_; }
 
   softarm_messages::pressure_command_t pressure_command;
   softarm_messages::torque_command_t torque_command;
   softarm_messages::controller_status_t status;
+  softarm_messages::observer_status_t observer;
 
  private:
   Eigen::Index width_;  ///< coordinates of a segment
+  ObserverReport report_;
   bool by_torque_;
 };
 

@@ -21,6 +21,7 @@ struct LcmSettings {
   std::string operator_channel = "SOFTARM_OPERATOR";
   std::string status_channel = "SOFTARM_STATUS";
   std::string timing_channel = "SOFTARM_TIMING";
+  std::string observer_channel = "SOFTARM_OBSERVER";
   std::string tick_channel = "SOFTARM_TICK";
   std::string valves_channel = "SOFTARM_VALVES";
   std::string plant_channel = "SOFTARM_PLANT";

@@ -8,6 +8,7 @@
 #include "apps/program.hpp"
 #include "apps/progress.hpp"
 #include "apps/softarm/commands.hpp"
+#include "apps/softarm/learned_output.hpp"
 #include "apps/softarm/plots.hpp"
 #include "softarm/config/load.hpp"
 #include "softarm/recording/runs_table.hpp"
@@ -21,6 +22,7 @@ struct ReportOptions {
   std::string log;
   std::string config;
   std::string out = "out";
+  std::string learned;
   bool plots = true;
 };
 
@@ -29,6 +31,7 @@ int report(const ReportOptions& options) {
   EventLogReader log(std::filesystem::path(options.log));
   const auto size = static_cast<double>(std::filesystem::file_size(options.log));
   StatusRecord record(experiment, options.out, {options.log});
+  LearnedOutput learned(options.learned, experiment, options.config, {options.log});
   Progress progress;
   for (LogEvent event; record.failure().empty() && log.next(event);) {
     record.take(event.channel, event.data);
@@ -54,8 +57,10 @@ int report(const ReportOptions& options) {
   }
   fmt::print("{}log, summary and timing are in {}\n", record.table(), options.out);
   if (options.plots) draw_plots(options.out);
-  if (!record.failure().empty()) {
-    print_error("softarm", record.failure());
+  std::string failure = learned.write(record.summary().observer(), options.log);
+  if (!record.failure().empty()) failure = record.failure();
+  if (!failure.empty()) {
+    print_error("softarm", failure);
     return kExitFailure;
   }
   if (log.damage_count() > 0) {
@@ -76,6 +81,7 @@ void add_report_command(CLI::App& app) {
   command
       ->add_option("--out", options->out, "folder for log.csv, summary.json, timing.json and plots")
       ->capture_default_str();
+  add_learned_option(*command, options->learned);
   command->add_flag("!--no-plots", options->plots, "do not draw the plots");
   command->callback([options] {
     if (std::filesystem::is_directory(options->log)) {

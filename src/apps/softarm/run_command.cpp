@@ -9,6 +9,7 @@
 #include "apps/progress.hpp"
 #include "apps/signals.hpp"
 #include "apps/softarm/commands.hpp"
+#include "apps/softarm/learned_output.hpp"
 #include "apps/softarm/plots.hpp"
 #include "softarm/base/clock.hpp"
 #include "softarm/base/time.hpp"
@@ -25,7 +26,7 @@ namespace {
 struct RunOptions {
   std::string config;
   std::string out = "out";
-  std::string mocap_log;
+  std::string mocap_log, learned;
   bool plots = true;
   double duration_s = 0.0;
   std::uint64_t seed = 0;
@@ -74,6 +75,7 @@ int run(const RunOptions& options) {
   const double duration_s =
       options.duration_s > 0.0 ? options.duration_s : experiment.run.duration_s;
   const double period_s = 1.0 / experiment.rate_hz;
+  LearnedOutput learned(options.learned, experiment, options.config);
 
   catch_stop_signals();  // what was recorded until then is kept
 
@@ -119,6 +121,9 @@ int run(const RunOptions& options) {
   release_stop_signals();
   fmt::print("{}{:.0f} times faster than real time; log, summary and timing are in {}\n",
              summary.table(), timing.real_time_factor, options.out);
+  if (const std::string unwritten = learned.write(summary.observer(), "the simulated arm");
+      failure.empty())
+    failure = unwritten;
   if (stop_requested != 0 && failure.empty())
     failure = fmt::format("stopped after {:.3g} of {:.3g} s", summary.duration_s(), duration_s);
   else if (options.plots)
@@ -152,6 +157,7 @@ void add_run_command(CLI::App& app) {
       ->check(positive_seconds());
   command->add_option("--mocap", options->mocap_log,
                       "take the frames from this LCM log instead of the simulated arm");
+  add_learned_option(*command, options->learned);
   command->add_flag("!--no-plots", options->plots, "do not draw the plots");
   auto* seed = command
                    ->add_option("--seed", options->seed,

@@ -10,6 +10,7 @@
 #include "apps/progress.hpp"
 #include "apps/signals.hpp"
 #include "apps/softarm/commands.hpp"
+#include "apps/softarm/learned_output.hpp"
 #include "apps/softarm/live_view.hpp"
 #include "softarm/client/operator_client.hpp"
 #include "softarm/config/load.hpp"
@@ -22,7 +23,7 @@ constexpr std::int64_t kSilence_ns = 10'000'000'000;  ///< without any status: n
 
 struct WatchOptions {
   std::string config;
-  std::string out;
+  std::string out, learned;
   double duration_s = 0.0;
 };
 
@@ -48,7 +49,9 @@ int watch(const WatchOptions& options) {
   OperatorClient client(lcm);
   client.listen(lcm.plant_channel);
   client.listen(lcm.timing_channel);
+  client.listen(lcm.observer_channel);
   StatusRecord record(experiment, options.out);
+  LearnedOutput learned(options.learned, experiment, options.config);
   std::int64_t last_status_ns = client.now_ns();
   client.on_message([&](const ArmMessage& message) {
     if (record.take(message.channel, message.bytes)) last_status_ns = client.now_ns();
@@ -87,8 +90,10 @@ int watch(const WatchOptions& options) {
     return kExitFailure;
   }
   fmt::print("{}", record.table());
-  if (record.failure().empty()) return kExitOk;
-  print_error("softarm", record.failure());
+  std::string failure = learned.write(record.summary().observer(), "a run that was watched");
+  if (!record.failure().empty()) failure = record.failure();
+  if (failure.empty()) return kExitOk;
+  print_error("softarm", failure);
   return kExitFailure;
 }
 
@@ -104,6 +109,7 @@ void add_watch_command(CLI::App& app) {
       ->add_option("--duration", options->duration_s,
                    "stop after so many seconds of ACTIVE (default: at Ctrl-C)")
       ->check(positive_seconds());
+  add_learned_option(*command, options->learned);
   command->callback([options] {
     if (const int code = watch(*options); code != kExitOk) throw CLI::RuntimeError(code);
   });

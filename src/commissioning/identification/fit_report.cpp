@@ -148,6 +148,12 @@ std::string memory_yaml(const ArmHypothesis& arm, bool directions) {
   return text;
 }
 
+/// Gravity, where it is not that of the configuration.
+std::string gravity_yaml(const Eigen::Vector3d& gravity_mps2, const char* indent) {
+  return fmt::format("{}gravity_mps2: {}\n", indent,
+                     list(3, [&](int i) { return gravity_mps2[i]; }));
+}
+
 std::string segments_yaml(const ArmParameters& arm, const char* indent) {
   const auto of = [&](double SegmentParameters::*member) {
     return list(arm.size(),
@@ -235,6 +241,8 @@ std::string identified_yaml(const Experiment& experiment, const ArmHypothesis& a
   };
   factor("mass_kg", &SegmentParameters::mass_kg);
   factor("length_m", &SegmentParameters::length_m);
+  const bool turned = arm.arm.gravity_mps2 != experiment.arm.gravity_mps2;
+  if (turned) text += gravity_yaml(arm.arm.gravity_mps2, "  ");
   // Chambers that cannot bend the arm to every side, as one identified from few motions, are no
   // actuation of a controller; they predict by `push_nm_per_bar`.
   if (chambers && (!choice.directions || reaches_every_direction(arm)))
@@ -252,6 +260,7 @@ std::string identified_yaml(const Experiment& experiment, const ArmHypothesis& a
     text += fmt::format("\ncontrol:\n  valve_lag_s: {:.6g}\n", arm.lag_s);
   text += "\n# The simulated arm is what it was.\nplant:\n  arm:\n" +
           segments_yaml(experiment.plant.arm, "    ") + plant_too;
+  if (turned) text += gravity_yaml(experiment.plant.arm.gravity_mps2, "    ");
   if (chambers)
     text += "  actuation:\n    chambers:\n" +
             chambers_yaml(of_plant(experiment), experiment.plant.actuation, "    ");

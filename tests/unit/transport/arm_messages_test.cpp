@@ -110,6 +110,34 @@ TEST(ArmMessages, EveryFlagIsItsOwn) {
   }
 }
 
+TEST(ArmMessages, AnObserverKeepsItsUnits) {
+  ObserverStatus observer;
+  auto message = example<observer_status_t>(3, 4);
+  message.flags |= observer_status_t::CONTACT;
+  ASSERT_TRUE(decode(encoded(message), observer));
+  const ObserverReport& report = observer.report;
+  EXPECT_EQ(observer.time_us, 47);
+  EXPECT_EQ(observer.tick, 48);
+  EXPECT_EQ(report.segments, 3);
+  EXPECT_TRUE(report.running && report.contact);
+  EXPECT_FALSE(report.surprised || report.wrong_model || report.pressure_loss);
+  EXPECT_EQ(report.failures, 2);
+  EXPECT_EQ(report.nis, 0.75);
+  EXPECT_EQ(report.force_n, Eigen::Vector3d(0.0, 0.0, -3.0));
+  EXPECT_EQ(report.force_covariance_n2(1, 1), 4.0);
+  // numbers(3, first): first, first + 0.25, ...; pairs likewise, each with its first one larger by 1.
+  EXPECT_EQ(report.correction.segment[2].stiffness, 1.5);
+  EXPECT_EQ(report.correction.segment[1].damping, 100.25);
+  EXPECT_EQ(report.correction.segment[0].gain, 200.0);
+  EXPECT_EQ(report.correction.segment[2].load, Eigen::Vector2d(302.0, 302.25));
+  EXPECT_EQ(report.correction.disturbance_nm[5], 402.25);
+  EXPECT_EQ(report.deviation.segment[1].stiffness, 500.25);
+  EXPECT_EQ(report.deviation.segment[2].damping, 600.5);
+  EXPECT_EQ(report.deviation.segment[0].gain, 700.0);
+  EXPECT_EQ(report.deviation.segment[1].load, Eigen::Vector2d(801.0, 801.25));
+  EXPECT_EQ(report.deviation.disturbance_nm[0], 900.0);
+}
+
 TEST(ArmMessages, MayPressuriseWhereItIsArmedOrHolds) {
   for (const Mode mode :
        {Mode::init, Mode::wait_frames, Mode::active, Mode::hold, Mode::vent, Mode::fault})

@@ -36,6 +36,7 @@ std::vector<LengthField> length_fields(const torque_command_t&) { return {{29, 2
 std::vector<LengthField> length_fields(const pressure_measurement_t&) { return {{33, 2}}; }
 std::vector<LengthField> length_fields(const curvature_reference_t&) { return {{16, 2}}; }
 std::vector<LengthField> length_fields(const valves_status_t&) { return {{64, 2}}; }
+std::vector<LengthField> length_fields(const observer_status_t&) { return {{74, 2}}; }
 std::vector<LengthField> length_fields(const plant_state_t&) { return {{17, 2}, {19, 2}}; }
 std::vector<LengthField> length_fields(const tick_record_t& record) {
   const auto lists = static_cast<std::size_t>(record.num_chambers + 3 * record.dimension);
@@ -71,10 +72,11 @@ class MessageDecoding : public ::testing::Test {
   static inline Message into{};
 };
 
-using AllMessages = ::testing::Types<mocap_frame_t, pressure_command_t, pressure_measurement_t,
-                                     curvature_reference_t, operator_command_t, controller_status_t,
-                                     plant_state_t, timing_t, tick_record_t, valves_status_t,
-                                     deadman_t, rigid_transform_t, torque_command_t>;
+using AllMessages =
+    ::testing::Types<mocap_frame_t, pressure_command_t, pressure_measurement_t,
+                     curvature_reference_t, operator_command_t, controller_status_t, plant_state_t,
+                     timing_t, tick_record_t, valves_status_t, deadman_t, rigid_transform_t,
+                     torque_command_t, observer_status_t>;
 class MessageName {
  public:
   template <class Message>

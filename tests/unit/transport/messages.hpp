@@ -168,6 +168,30 @@ inline softarm_messages::valves_status_t example(int segments, int chambers) {
 }
 
 template <>
+inline softarm_messages::observer_status_t example(int segments, int /*chambers*/) {
+  softarm_messages::observer_status_t message{};
+  message.time_us = 47;
+  message.tick = 48;
+  message.flags = softarm_messages::observer_status_t::RUNNING;
+  message.failures = 2;
+  message.nis = 0.75F;
+  message.force_n[2] = -3.0F;
+  message.force_covariance_n2[1][1] = 4.0F;
+  message.num_segments = static_cast<std::int16_t>(segments);
+  message.stiffness = numbers<float>(segments, 1.0);
+  message.damping = numbers<float>(segments, 100.0);
+  message.gain = numbers<float>(segments, 200.0);
+  message.load = pairs<float>(segments, 300.0);
+  message.disturbance_nm = pairs<float>(segments, 400.0);
+  message.stiffness_deviation = numbers<float>(segments, 500.0);
+  message.damping_deviation = numbers<float>(segments, 600.0);
+  message.gain_deviation = numbers<float>(segments, 700.0);
+  message.load_deviation = pairs<float>(segments, 800.0);
+  message.disturbance_deviation_nm = pairs<float>(segments, 900.0);
+  return message;
+}
+
+template <>
 inline softarm_messages::timing_t example(int /*segments*/, int /*chambers*/) {
   softarm_messages::timing_t message{};
   message.ticks = 1'000'000;

@@ -38,6 +38,7 @@ std::string table(const std::vector<RobustnessRow>& rows, const std::vector<Obse
                         trial.pressure_rate_bar_per_s, trial.tick_us, trial.frame_tick_us,
                         trial.nis, 100.0 * trial.surprised);
   }
+  if (costs.empty()) return text;
   text += fmt::format("\n{:<36}{:>10}{:>10}\n", "the observer alone, segments", "tick [us]",
                       "frame [us]");
   for (const ObserverCost& cost : costs)

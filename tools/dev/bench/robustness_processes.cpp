@@ -1,0 +1,108 @@
+// A row of softarm-dev bench robustness over LCM: softarmd and softarm-plant as they run beside an
+// arm.
+#include <fmt/format.h>
+#include <signal.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <stdexcept>
+
+#include "dev/bench/robustness_scenes.hpp"
+#include "dev/child_process.hpp"
+#include "softarm/base/clock.hpp"
+#include "softarm/base/time.hpp"
+#include "softarm/config/load.hpp"
+#include "softarm/recording/status_record.hpp"
+#include "softarm/transport/lcm_node.hpp"
+
+namespace softarm {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Until ACTIVE, and for what a busy machine may take longer.
+constexpr double kPatience_s = 30.0;
+
+/// A folder, and a port of the network, of one process.
+class Place {
+ public:
+  Place() : folder_(fs::temp_directory_path() / fmt::format("softarm_robustness_{}", getpid())) {
+    fs::create_directories(folder_);
+    setenv("XDG_STATE_HOME", folder_.c_str(), 1);  // of the daemon
+  }
+  ~Place() { fs::remove_all(folder_); }
+  Place(const Place&) = delete;
+  Place& operator=(const Place&) = delete;
+
+  fs::path file(const std::string& name) const { return folder_ / name; }
+  static std::string url() {
+    return fmt::format("udpm://239.255.76.67:{}?ttl=0", 20000 + getpid() % 12000);
+  }
+
+ private:
+  fs::path folder_;
+};
+
+}  // namespace
+
+bool needs_lock_step(const RobustnessScene& scene) {
+  const LoopFaults& faults = scene.faults;
+  return faults.frame || faults.play_bar > 0.0 || faults.resolution_bar > 0.0 ||
+         faults.hysteresis > 0.0;
+}
+
+RobustnessTrial run_processes(const Experiment& asked, const RobustnessScene& scene,
+                              std::uint64_t seed) {
+  if (needs_lock_step(scene))
+    throw std::invalid_argument(scene.name + ": no configuration describes these faults");
+  const Place place;
+  Experiment e = asked;
+  e.seed = e.plant.seed = seed;
+  e.transport.lcm.url = Place::url();
+  e.run.tracking_from_s = scene.counted_from_s;
+  const fs::path config = place.file("scene.yaml");
+  std::ofstream(config) << resolved_text(e);
+  const Experiment loaded = load_experiment(config);
+
+  StatusRecord record(loaded, {});
+  LcmNode node(loaded.transport.lcm.url);
+  const LcmSettings& lcm = loaded.transport.lcm;
+  bool began = false;
+  RobustnessTrial trial;
+  for (const std::string& channel : {lcm.status_channel, lcm.plant_channel, lcm.observer_channel})
+    node.subscribe(channel, 1024, [&, channel](const ReceivedMessage& packet) {
+      if (!record.take(channel, packet.bytes)) return;
+      const bool active = record.status().mode == Mode::active;
+      trial.stayed_active &= active || !began;
+      began |= active;
+    });
+  ChildProcess plant(program_beside_this("softarm-plant"), {config.string()},
+                     place.file("plant.txt").string());
+  ChildProcess daemon(program_beside_this("softarmd"), {config.string()},
+                      place.file("daemon.txt").string());
+  const double until_s = scene.counted_from_s + scene.counted_s;
+  const std::int64_t end_ns = monotonic_now_ns() + to_ns(until_s + kPatience_s);
+  while (record.active_s() < until_s && monotonic_now_ns() < end_ns)
+    node.wait_until(monotonic_now_ns() + 10'000'000);
+  for (ChildProcess* each : {&daemon, &plant}) {
+    each->signal(SIGTERM);
+    each->wait(std::chrono::seconds(5));
+  }
+  record.close();
+  trial.stayed_active &= record.active_s() >= until_s;
+  const TrackingSummary& summary = record.summary();
+  trial.u_rms_rad = summary.u_rms_rad();
+  trial.u_largest_rad = summary.u_max_rad();
+  trial.tip_rms_m = summary.tip_rms_m();
+  trial.nis = summary.nis();
+  trial.surprised = summary.surprised_fraction();
+  if (!began)
+    throw std::runtime_error(scene.name + ": the arm was never ACTIVE\n" + daemon.printed() +
+                             plant.printed());
+  return trial;
+}
+
+}  // namespace softarm
