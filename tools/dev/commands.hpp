@@ -24,6 +24,9 @@ void add_bench_plant_command(CLI::App& group);
 /// to `softarm-dev bench`
 void add_bench_loop_command(CLI::App& group);
 
+/// softarm-dev bench mocap [--frames N] [--port PORT]: added to `softarm-dev bench`
+void add_bench_mocap_command(CLI::App& group);
+
 /// softarm-dev fault CONFIG FAULT | --list
 void add_fault_command(CLI::App& app);
 
