@@ -34,7 +34,9 @@ struct ArmClient::State {
   explicit State(Experiment from)
       : experiment(std::move(from)),
         mocap(experiment.transport, experiment.safety, experiment.arm),
-        sight(experiment) {}
+        sight(experiment) {
+    mocap.open(experiment.transport);
+  }
 
   void take_packet(std::size_t channel, const ArmMessage& message) {
     const MocapReceipt receipt = mocap.take(channel, message.bytes, message.arrival_ns, frame);
@@ -134,6 +136,12 @@ ArmClient::~ArmClient() {
 
 void ArmClient::after_round() {
   State& state = *state_;
+  while (true) {
+    const MocapReceipt receipt = state.mocap.receive(now_ns(), state.frame);
+    if (receipt == MocapReceipt::nothing) break;
+    if (receipt == MocapReceipt::malformed) ++state.not_frames;
+    if (receipt == MocapReceipt::frame) state.take_frame(state.mocap.arrival_ns());
+  }
   if (state.mocap.overdue(now_ns(), state.frame)) state.take_frame(now_ns());
 }
 

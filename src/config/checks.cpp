@@ -49,6 +49,7 @@ class Checks {
     check_bodies();
     check_safety();
     check_lcm();
+    check_mocap_server();
     check_valves();
     check_loads();
     check_contact();
@@ -318,6 +319,35 @@ class Checks {
     require(!network.starts_with("udpm://") || network == "udpm://" ||
                 network.find(':', 7) != std::string::npos,
             "daemon.lcm.url", "a port behind the group" + example, in_quotes(url));
+  }
+
+  void check_mocap_server() const {
+    const TransportSettings& transport = experiment_.transport;
+    if (!transport.mocap.source.network) return;
+    const MocapNetworkSettings& it = transport.mocap.network;
+    const auto check_address = [&](const char* key, const std::string& text) {
+      in_addr address{};
+      require(inet_pton(AF_INET, text.c_str(), &address) == 1, key,
+              "an IPv4 address such as 192.168.1.20", in_quotes(text));
+    };
+    check_address("daemon.mocap.host", it.host);
+    check_address("daemon.mocap.local_address", it.local_address);
+    if (!it.multicast.empty()) check_address("daemon.mocap.multicast", it.multicast);
+    const std::size_t dot = it.version.find('.');
+    const bool numbers = dot > 0 && dot + 1 < it.version.size() &&
+                         std::all_of(it.version.begin(), it.version.end(), [](unsigned char c) {
+                           return std::isdigit(c) != 0 || c == '.';
+                         });
+    require(numbers, "daemon.mocap.version", "two numbers such as 4.1", in_quotes(it.version));
+    std::set<std::string> seen;
+    const BodySettings& bodies = transport.bodies;
+    const auto check_name = [&](const char* key, const std::string& name) {
+      if (!name.empty()) once(seen, name, key, "every body once", in_quotes(name) + " twice");
+    };
+    if (bodies.base_id >= 0)
+      check_name("daemon.bodies.base_plate.name", bodies.base_marker_frame.name);
+    for (const MarkerFrameSettings& body : bodies.segment_marker_frames)
+      check_name("daemon.bodies.segment_plates", body.name);
   }
 
   void check_valves() const {

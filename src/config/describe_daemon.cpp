@@ -93,6 +93,26 @@ static void describe(Keys& key, SafetySettings& it) {
   KEY(deadman_timeout_s, above(0, 2), "without a go on lcm.deadman_channel: VENT");
 }
 
+static void describe_network(Keys& key, MocapSourceSettings& mocap) {
+  MocapNetworkSettings& it = mocap.network;
+  const auto& kind = mocap.source.network;
+  if (key.reading() && kind) {
+    it.port = kind->port;
+    it.version = kind->version;
+  }
+  key.when(kind.has_value(), [&] {
+    KEY(host, from(7, 15), "IPv4 address of the server of natnet or qtm");
+    KEY(port, from(1, 65535), "where it takes requests; left out: 1510 for natnet, 22223 for qtm");
+    KEY(local_address, from(7, 15), "of the network card; 0.0.0.0: the system chooses");
+    KEY(version, from(3, 8),
+        "of the protocol: qtm is asked for it; of natnet the server decides (softarm-plant: this)");
+  });
+  key.when(kind && kind->multicast, [&] {
+    KEY(multicast, from(0, 15), "group of the frames, in Motive 239.255.42.99; empty: unicast");
+    KEY(data_port, from(1, 65535), "of the frames by multicast");
+  });
+}
+
 static void describe_mocap(Keys& key, TransportSettings& transport) {
   const std::vector<double> z_up = {1, 0, 0, 0, 1, 0, 0, 0, 1};
   const std::vector<double> y_up = {1, 0, 0, 0, 0, -1, 0, 1, 0};
@@ -101,27 +121,33 @@ static void describe_mocap(Keys& key, TransportSettings& transport) {
   std::size_t source = mocap_sources().index(it.source.name());
   key("source", source, one_of(names),
       "softarm: mocap_frame_t; optitrack: optitrack_frame_t; rigid_transform: rigid_transform_t "
-      "(Vicon), one channel a body");
+      "(Vicon), one channel a body; natnet: OptiTrack Motive; qtm: Qualisys");
   if (key.reading()) {
     it.source = mocap_sources().all()[source];
     it.quaternion = it.source.quaternion;
+    it.unit = it.source.unit;
     transport.lcm.mocap_channel = it.source.channel;
   }
-  KEY(unit, one_of({"m", "mm"}), "of the positions sent");
-  KEY(quaternion, one_of({"xyzw", "wxyz"}), "order; left out: xyzw for optitrack, else wxyz");
+  KEY(unit, one_of({"m", "mm"}), "of the positions sent; left out: mm for qtm, else m");
+  key.when(!it.source.network, [&] {
+    KEY(quaternion, one_of({"xyzw", "wxyz"}), "order; left out: xyzw for optitrack, else wxyz");
+  });
   KEY(axes, from(-1, 1).or_word("z_up", z_up).or_word("y_up", y_up),
       "of the sender's world: z_up; y_up (x, -z, y become our x, y, z); or the rotation to ours");
+  describe_network(key, it);
 }
 
-static void describe_frame(Keys& key, MarkerFrameSettings& it, bool named) {
-  key.when(named, [&] {
-    KEY(name, from(1, 40), "of the body, whose channel is lcm.mocap_channel, _, name");
+static void describe_frame(Keys& key, MarkerFrameSettings& it, const MocapSourceKind& source) {
+  key.when(source.named(), [&] {
+    KEY(name, from(source.network ? 0 : 1, 40),
+        "of the body: of rigid_transform's channel after lcm.mocap_channel and _; of natnet's or "
+        "qtm's server (empty: the id counts)");
   });
   KEY(position_m, from(-10, 10), "of S_i in the body's own frame");
   KEY(rotation_rad, from(-kTwoPi, kTwoPi), "rotation vector of S_i in the body's own frame");
 }
 
-static void describe_bodies(Keys& key, BodySettings& it, bool named) {
+static void describe_bodies(Keys& key, BodySettings& it, const MocapSourceKind& source) {
   const Form id = from(0, 2147483647.0);
   const auto n = static_cast<std::size_t>(key.segments);
   if (it.segment_ids.empty()) {
@@ -130,19 +156,20 @@ static void describe_bodies(Keys& key, BodySettings& it, bool named) {
   }
   if (it.segment_marker_frames.empty()) {
     it.segment_marker_frames.resize(n);
-    if (named) it.base_marker_frame.name = "base";
-    for (std::size_t i = 0; i < n && named; ++i)
+    if (source.channel_per_body) it.base_marker_frame.name = "base";
+    for (std::size_t i = 0; i < n && source.channel_per_body; ++i)
       it.segment_marker_frames[i].name = "segment_" + std::to_string(i + 1);
   }
   KEY(base_id, id.or_word("fixed", -1), "body of the base, or fixed: arm.base holds");
   KEY(segment_ids, id.each(),
-      "bodies of the segments' ends, base to tip (rigid_transform: names instead); left out: 1, 2, "
-      "...");
+      "bodies of the segments' ends, base to tip (rigid_transform: names instead; qtm: the place "
+      "in "
+      "its list, from 1); left out: 1, 2, ...");
   key.section({"base_plate", "S_0 on the body of the base; softarm calibrate finds it"},
-              [&] { describe_frame(key, it.base_marker_frame, named); });
+              [&] { describe_frame(key, it.base_marker_frame, source); });
   key.one_or_each({"segment_plates", "S_i on the segments' bodies, of all or a list; likewise"},
                   it.segment_marker_frames,
-                  [&](auto& frame) { describe_frame(key, frame, named); });
+                  [&](auto& frame) { describe_frame(key, frame, source); });
 }
 
 static void describe(Keys& key, RealtimeSettings& it) {
@@ -188,9 +215,8 @@ void describe_daemon(Keys& key, Experiment& it) {
   KEY(safety, "thresholds of the safety monitor");
   key.section({"mocap", "the sender of frames, and its conventions"},
               [&] { describe_mocap(key, transport); });
-  const bool named = transport.mocap.source.channel_per_body;
   key.section({"bodies", "which bodies of a frame carry the base and the segments' ends"},
-              [&] { describe_bodies(key, transport.bodies, named); });
+              [&] { describe_bodies(key, transport.bodies, transport.mocap.source); });
   KEY(realtime, "scheduling and memory of the daemon");
   key.section({"lcm", "channels, distinct where two arms share a machine"},
               [&] { describe_lcm(key, transport.lcm, it.safety); });

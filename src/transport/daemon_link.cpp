@@ -54,6 +54,7 @@ DaemonLink::DaemonLink(const PipelineSettings& settings, const TransportSettings
   heard_torques_.torque_nm.reserve(kMaxChambers);
   measured_bar_.setZero(std::ssize(messages_.pressure_command.pressure_bar));
 
+  mocap_.open(transport);
   for (std::size_t k = 0; k < mocap_.channels().size(); ++k)
     node_.subscribe(mocap_.channels()[k], kFrameCapacity,
                     [this, k](const auto& packet) { take_frame(k, packet); });
@@ -91,6 +92,7 @@ TickInput DaemonLink::collect(std::int64_t now_ns) noexcept {
   input_.requests.lost = requests_lost(previous_ns);
   // Of two inputs the one that is released is right; in a flood it may be the one not heard.
   if (released_ || goes_ >= kRequestCapacity) newest_go_ns_ = kNever;
+  receive_frames();
   if (frame_count_ < frames_.size() && mocap_.overdue(now_ns, frames_[frame_count_]))
     ++frame_count_;
   input_.frames = {frames_.data(), frame_count_};
@@ -112,6 +114,16 @@ void DaemonLink::take_frame(std::size_t channel, const ReceivedMessage& packet) 
       mocap_.take(channel, packet.bytes, arrival_ns(packet), frames_[frame_count_]);
   if (receipt == MocapReceipt::malformed) ++malformed_;
   if (receipt == MocapReceipt::frame) ++frame_count_;
+}
+
+/// From a server; what is more than the frames of a tick waits in the kernel's queue.
+void DaemonLink::receive_frames() noexcept {
+  for (std::size_t steps = 0; steps < 2 * frames_.size() && frame_count_ < frames_.size();
+       ++steps) {
+    const MocapReceipt receipt = mocap_.receive(now_ns_, frames_[frame_count_]);
+    if (receipt == MocapReceipt::nothing) return;
+    receipt == MocapReceipt::frame ? ++frame_count_ : ++malformed_;
+  }
 }
 
 void DaemonLink::take_reference(const ReceivedMessage& packet) noexcept {

@@ -14,6 +14,7 @@ constexpr std::int64_t kNonsense_us = kLatest_us + 1;  // no clock relation take
 }  // namespace
 
 std::vector<std::string> mocap_channels(const TransportSettings& transport) {
+  if (transport.mocap.source.network) return {};
   if (!transport.mocap.source.channel_per_body) return {transport.lcm.mocap_channel};
   std::vector<std::string> channels;
   if (transport.bodies.base_id >= 0)
@@ -21,6 +22,20 @@ std::vector<std::string> mocap_channels(const TransportSettings& transport) {
   for (const MarkerFrameSettings& frame : transport.bodies.segment_marker_frames)
     channels.push_back(body_channel(transport.lcm, frame));
   return channels;
+}
+
+std::string mocap_place(const TransportSettings& transport) {
+  const MocapNetworkSettings& network = transport.mocap.network;
+  if (transport.mocap.source.network)
+    return std::string(transport.mocap.source.name()) + " at " + network.host + " port " +
+           std::to_string(network.port);
+  return mocap_channels(transport).front();
+}
+
+const char* MocapStanding::text() const noexcept {
+  constexpr const char* kText[] = {"no answer from the server", "the server knows no body",
+                                   "frames arrive"};
+  return kText[static_cast<std::size_t>(state)];
 }
 
 MocapSource::MocapSource(const TransportSettings& transport, const SafetySettings& safety,
@@ -44,6 +59,26 @@ MocapReceipt MocapSource::take(std::size_t channel, std::span<const std::byte> b
                                std::int64_t arrival_ns, MocapFrame& frame) noexcept {
   if (!format_->decode(bytes, *sent_)) return MocapReceipt::malformed;
   if (kind_.channel_per_body) return take_body(channel, arrival_ns, frame);
+  return take_sent(arrival_ns, frame);
+}
+
+void MocapSource::open(const TransportSettings& transport) {
+  if (kind_.network) connection_ = kind_.network->connect(transport);
+}
+
+MocapReceipt MocapSource::receive(std::int64_t now_ns, MocapFrame& frame) noexcept {
+  if (!connection_) return MocapReceipt::nothing;
+  const MocapNews news = connection_->next(now_ns, *sent_, arrival_ns_);
+  if (news == MocapNews::frame) return take_sent(arrival_ns_, frame);
+  return news == MocapNews::malformed ? MocapReceipt::malformed : MocapReceipt::nothing;
+}
+
+std::optional<MocapStanding> MocapSource::standing() const noexcept {
+  if (!connection_) return std::nullopt;
+  return connection_->standing();
+}
+
+MocapReceipt MocapSource::take_sent(std::int64_t arrival_ns, MocapFrame& frame) noexcept {
   adapter_.to_frame(*sent_, frame);
   const std::int64_t stamp_us =
       is_time_us(sent_->sender_time_us) ? sent_->sender_time_us : kNonsense_us;
@@ -87,11 +122,17 @@ MocapSender::MocapSender(const TransportSettings& transport, const ArmParameters
       adapter_(transport.bodies, arm, transport.mocap),
       channels_(mocap_channels(transport)),
       format_(kind_.make()),
-      sent_(std::make_unique<SentFrame>()) {}
+      sent_(std::make_unique<SentFrame>()) {
+  if (kind_.network) server_ = kind_.network->serve(transport);
+}
 
 void MocapSender::publish(LcmNode& node, const MocapFrame& frame, std::int64_t sender_time_us) {
   if (!kind_.channel_per_body) {
     adapter_.to_sent(frame, sender_time_us, *sent_);
+    if (server_) {
+      server_->send(*sent_);
+      return;
+    }
     node.publish_encoded(channels_.front(), format_->encode(*sent_));
     return;
   }

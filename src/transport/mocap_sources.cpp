@@ -8,6 +8,8 @@ Registry<MocapSourceKind>& mocap_sources() {
       softarm_mocap(),
       SOFTARM_KIND_OF_FILE(MocapSourceKind, optitrack_mocap),
       SOFTARM_KIND_OF_FILE(MocapSourceKind, rigid_transform_mocap),
+      SOFTARM_KIND_OF_FILE(MocapSourceKind, natnet_mocap),
+      SOFTARM_KIND_OF_FILE(MocapSourceKind, qtm_mocap),
   });
   return sources;
 }

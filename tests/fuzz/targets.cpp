@@ -23,6 +23,8 @@ const std::vector<FuzzTarget>& fuzz_targets() {
       decoder<rigid_transform_t>(),
       {"optitrack_frame_t", run_optitrack, optitrack_seeds, decoder_words, 2048, 10'000'000},
       {"mocap_sources", run_mocap, mocap_seeds, decoder_words, 2048, 10'000'000},
+      {"natnet", run_natnet, natnet_seeds, decoder_words, 2048, 10'000'000},
+      {"qtm", run_qtm, qtm_seeds, qtm_words, 2048, 10'000'000},
       {"yaml", run_yaml, yaml_seeds, yaml_words, 4096, kLong},
       {"log", run_log, log_seeds, log_words, 4096, kLong},
       {"replay", run_replay, replay_seeds, replay_words, 8192, kLong},

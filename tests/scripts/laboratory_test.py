@@ -10,7 +10,7 @@ import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 PROGRAMS = pathlib.Path(sys.argv.pop(1))
-PATIENCE_S = 300
+PATIENCE_S = 600
 PAGE = ROOT / "docs/tutorial/laboratory.md"
 
 if subprocess.run([ROOT / "tools/with_loopback_network", "true"], capture_output=True, check=False).returncode != 0:

@@ -49,6 +49,7 @@ void add_bench_command(CLI::App& app) {
   add_bench_recordings_command(*group);
   add_bench_loop_command(*group);
   add_bench_python_command(*group);
+  add_bench_mocap_command(*group);
   CLI::App* command = group->add_subcommand(
       "model", "Time and error of every route to the model's terms, for 1 to 100 segments");
   command->add_flag("--json", options->json, "print JSON instead of tables");

@@ -30,6 +30,8 @@ void add_bench_loop_command(CLI::App& group);
 /// softarm-dev bench python [--json] [--seconds S] [--soromox PYTHON] [CONFIG]: added to
 /// `softarm-dev bench`
 void add_bench_python_command(CLI::App& group);
+/// softarm-dev bench mocap [--frames N] [--port PORT]: added to `softarm-dev bench`
+void add_bench_mocap_command(CLI::App& group);
 
 /// softarm-dev fault CONFIG FAULT | --list
 void add_fault_command(CLI::App& app);

@@ -82,11 +82,14 @@ class DaemonLink {
   std::int64_t backward_measurements() const noexcept { return backward_measurements_; }
   /// References with a number that is not above the newest.
   std::int64_t backward_references() const noexcept { return backward_references_; }
+  /// How far the connection to a motion-capture server is; none over LCM.
+  std::optional<MocapStanding> mocap_standing() const noexcept { return mocap_.standing(); }
   /// Publications that failed, and commands that were too late to send.
   std::int64_t unsent() const noexcept { return unsent_; }
 
  private:
   void take_frame(std::size_t channel, const ReceivedMessage& packet) noexcept;
+  void receive_frames() noexcept;
   void take_reference(const ReceivedMessage& packet) noexcept;
   void take_operator(const ReceivedMessage& packet) noexcept;
   void take_measurement(const ReceivedMessage& packet) noexcept;

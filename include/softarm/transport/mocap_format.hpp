@@ -9,6 +9,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string_view>
 
@@ -54,6 +55,23 @@ class MocapFormat {
 /// In which order the four numbers of a quaternion are sent.
 enum class QuaternionOrder { xyzw, wxyz };
 
+/// Of positions as they are sent.
+enum class LengthUnit { metre, millimetre };
+
+struct TransportSettings;
+class MocapConnection;
+class MocapServer;
+
+/// What a source needs that has its own server instead of LCM (mocap_connection.hpp).
+struct MocapNetworkKind {
+  /// @throws TransportError
+  std::unique_ptr<MocapConnection> (*connect)(const TransportSettings& transport);
+  std::unique_ptr<MocapServer> (*serve)(const TransportSettings& transport);
+  int port = 0;              ///< of the server, unless configured
+  const char* version = "";  ///< of the protocol, likewise
+  bool multicast = false;    ///< whether frames may come by multicast
+};
+
 /// Who sends frames, and in which messages.
 struct MocapSourceKind {
   const char* label;  ///< as configurations name it
@@ -64,7 +82,11 @@ struct MocapSourceKind {
   /// A packet is one body, on channel `lcm.mocap_channel`, _, its name; bodies with one sender time
   /// are a frame.
   bool channel_per_body = false;
+  LengthUnit unit = LengthUnit::metre;
+  std::optional<MocapNetworkKind> network = {};  ///< none: over LCM
 
+  /// Whether bodies go by names.
+  bool named() const noexcept { return channel_per_body || network.has_value(); }
   const char* name() const noexcept { return label; }
   bool operator==(const MocapSourceKind& other) const noexcept {
     return std::string_view(label) == other.label;

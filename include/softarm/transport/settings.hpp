@@ -28,8 +28,15 @@ struct LcmSettings {
   std::string deadman_channel;
 };
 
-/// Of positions as they are sent.
-enum class LengthUnit { metre, millimetre };
+/// Where the server of a source without LCM is.
+struct MocapNetworkSettings {
+  std::string host = "127.0.0.1";         ///< IPv4 address of the server
+  int port = 1510;                        ///< where it takes requests
+  std::string local_address = "0.0.0.0";  ///< of our network card; 0.0.0.0: the system chooses
+  std::string multicast = {};             ///< group of the frames; empty: unicast
+  int data_port = 1511;                   ///< of the frames by multicast
+  std::string version = {};               ///< of the protocol
+};
 
 /// Meaning of the numbers in a frame.
 struct MocapSourceSettings {
@@ -38,6 +45,7 @@ struct MocapSourceSettings {
   QuaternionOrder quaternion = QuaternionOrder::wxyz;
   /// p_world = axes * p_sent: from the sender's world to ours, whose z axis points up.
   Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();
+  MocapNetworkSettings network = {};
 };
 
 /// A marker frame: the pose of the segment frame S_i in the frame of the rigid body that is

@@ -2,13 +2,10 @@
 // segments' frames on their marker bodies.
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <filesystem>
 #include <map>
 #include <memory>
 #include <optional>
-#include <stdexcept>
-#include <vector>
 
 #include "apps/program.hpp"
 #include "apps/progress.hpp"
@@ -16,17 +13,12 @@
 #include "apps/softarm/commands.hpp"
 #include "softarm/base/output_file.hpp"
 #include "softarm/base/version.hpp"
-#include "softarm/client/arm_client.hpp"
 #include "softarm/commissioning/calibration/rest_calibration.hpp"
+#include "softarm/commissioning/calibration/rest_recording.hpp"
 #include "softarm/config/load.hpp"
-#include "softarm/transport/mocap_source.hpp"
 
 namespace softarm {
 namespace {
-
-constexpr std::int64_t kPatience_ns = 5'000'000'000;
-constexpr std::int64_t kLook_ns = 50'000'000;
-constexpr double kNoPressure_bar = 0.01;
 
 struct CalibrateOptions {
   std::string config, output;
@@ -34,60 +26,16 @@ struct CalibrateOptions {
   BaseSource base = BaseSource::marker_frame;
 };
 
-/// Body poses: as the source sends them, in our world, without the configured marker frames.
-Experiment without_marker_frames(Experiment experiment) {
-  const auto clear = [](MarkerFrameSettings& frame) {
-    frame.position_m.setZero();
-    frame.rotation_rad.setZero();
-  };
-  clear(experiment.transport.bodies.base_marker_frame);
-  for (MarkerFrameSettings& frame : experiment.transport.bodies.segment_marker_frames) clear(frame);
-  return experiment;
-}
-
-/// Frames of an arm without pressure for `duration_s`, counted from the first.
-std::vector<MocapFrame> watch(const Experiment& experiment, double duration_s) {
-  std::vector<MocapFrame> frames;
-  std::int64_t first_ns = 0;
-  double most_bar = 0.0;
-  ArmClient client(without_marker_frames(experiment));
-  client.on_frame([&](const CapturedFrame& captured) {
-    if (frames.empty()) first_ns = captured.arrival_ns;
-    frames.push_back(captured.frame);
-  });
-  client.on_command([&](const ChamberCommand& command) {
-    if (!command.shadow && command.pressure_bar.size() > 0)
-      most_bar = std::max(most_bar, command.pressure_bar.maxCoeff());
-  });
-  Progress progress;
-  const std::int64_t begin_ns = client.now_ns();
-  for (std::int64_t now_ns = begin_ns; stop_requested == 0; now_ns = client.now_ns()) {
-    if (frames.empty() && now_ns - begin_ns > kPatience_ns)
-      throw std::runtime_error(
-          fmt::format("no frame on {} for {} s: is motion capture running, and are "
-                      "transport.mocap.source and "
-                      "daemon.lcm.url right? {} messages came that are not of this source",
-                      mocap_channels(experiment.transport).front(), kPatience_ns / 1'000'000'000,
-                      client.not_frames()));
-    if (!frames.empty() && now_ns - first_ns >= to_ns(duration_s)) return frames;
-    if (most_bar > kNoPressure_bar)
-      throw std::runtime_error(
-          fmt::format("the arm is under pressure ({:.3f} bar commanded): expected none; softarm "
-                      "disarm, or end what commands it",
-                      most_bar));
-    client.update(now_ns + kLook_ns);
-    progress.update(fmt::format("{} frames of {:g} s", frames.size(), duration_s));
-  }
-  throw std::runtime_error("stopped");
-}
-
 int calibrate(const CalibrateOptions& options) {
   namespace fs = std::filesystem;
   const Experiment experiment = load_experiment(options.config);
   std::optional<OutputFile> output;  // refused before the arm is watched, not after
   if (!options.output.empty()) output.emplace(options.output, experiment.files);
   catch_stop_signals();
-  const auto frames = watch(experiment, options.duration_s);
+  Progress progress;
+  const auto frames = record_rest(
+      experiment, options.duration_s, [] { return stop_requested != 0; },
+      [&](const std::string& text) { progress.update(text); });
   const RestCalibration found = calibrate_rest(experiment, frames, options.base);
   fmt::print("{}", calibration_text(experiment, found));
   if (!output) return kExitOk;
@@ -95,8 +43,8 @@ int calibrate(const CalibrateOptions& options) {
       "Marker frames, S_i on the marker bodies: softarm calibrate {}, {} frames at rest.",
       version_text(), found.body.back().frames);
   const fs::path folder = fs::absolute(output->partial()).parent_path();
-  output->write(calibrated_yaml(experiment, found, note,
-                                fs::proximate(fs::absolute(options.config), folder).string()));
+  output->write(
+      calibrated_yaml(found, note, fs::proximate(fs::absolute(options.config), folder).string()));
   output->flush();
   load_experiment(output->partial());
   output->commit();

@@ -12,6 +12,9 @@ void add_calibrate_command(CLI::App& app);
 /// softarm check CONFIG [--live [--pulse]] | --template
 void add_check_command(CLI::App& app);
 
+/// softarm commission CONFIG [--out DIR] [--yes]
+void add_commission_command(CLI::App& app);
+
 /// softarm eval FILE [--mass point|distributed] [--method direct|augmented]
 void add_eval_command(CLI::App& app);
 

@@ -9,7 +9,7 @@ namespace softarm {
 struct LiveCheckOptions {
   double listen_s = 5.0;
   bool pulse = false;  ///< fill every chamber once: this moves the arm
-  PulsePlan plan;
+  PulsePlan plan = {};
   bool json = false;
 };
 

@@ -9,6 +9,7 @@ int main(int argc, char** argv) {
   app.require_subcommand(0, 1);
   softarm::add_calibrate_command(app);
   softarm::add_check_command(app);
+  softarm::add_commission_command(app);
   softarm::add_eval_command(app);
   softarm::add_identify_command(app);
   softarm::add_import_command(app);

@@ -105,6 +105,11 @@ void run(DaemonLoop& loop, LineLog& log, ServiceNotifier& service, const LcmSett
     if (const auto text = report_inputs.second_sender(now_ns, counts); !text.empty())
       log.add("{}", text);
   };
+  std::optional<MocapStanding> standing;
+  const auto report_mocap = [&] {
+    if (std::exchange(standing, loop.link().mocap_standing()) != standing)
+      log.add("motion capture: {} {}", standing->text(), standing->body);
+  };
   std::int32_t held_us = loop.link().asked_us();
   const auto report_validity = [&] {
     if (loop.link().held_us() == held_us) return;
@@ -129,6 +134,7 @@ void run(DaemonLoop& loop, LineLog& log, ServiceNotifier& service, const LcmSett
              }
              report_refused(report.woken_ns);
              report_streams(report.woken_ns);
+             report_mocap();
              report_validity();
              service.report(report.woken_ns, {.state = name(mode),
                                               .reason = name(reason),

@@ -247,15 +247,14 @@ std::string calibration_text(const Experiment& experiment, const RestCalibration
   return text;
 }
 
-std::string calibrated_yaml(const Experiment& experiment, const RestCalibration& found,
-                            const std::string& note, const std::string& config) {
-  const bool named = experiment.transport.mocap.source.channel_per_body;
+std::string calibrated_yaml(const RestCalibration& found, const std::string& note,
+                            const std::string& config) {
   const auto row = [&](const MarkerFrameSettings& each) {
     const Eigen::Vector3d &p = each.position_m, &r = each.rotation_rad;
     return fmt::format(
         "{{{}position_m: [{:.9f}, {:.9f}, {:.9f}], rotation_rad: [{:.9f}, {:.9f}, {:.9f}]}}",
-        named ? fmt::format("name: {}, ", each.name) : "", p.x(), p.y(), p.z(), r.x(), r.y(),
-        r.z());
+        !each.name.empty() ? fmt::format("name: {}, ", each.name) : "", p.x(), p.y(), p.z(), r.x(),
+        r.y(), r.z());
   };
   std::string text = fmt::format("# {}\ninclude: {}\n\ndaemon:\n  bodies:\n", note, config);
   if (found.bodies.base_id >= 0)

@@ -72,7 +72,7 @@ class LiveExperiment {
       throw std::runtime_error(fmt::format(
           "no frame with every segment on {} for {} s: is motion capture running, and do "
           "daemon.bodies name its bodies?",
-          mocap_channels(client_.experiment().transport).front(), kPatience_ns / 1'000'000'000));
+          mocap_place(client_.experiment().transport), kPatience_ns / 1'000'000'000));
     throw std::runtime_error(
         "the arm moves before the first step: expected it at rest; is another controller "
         "commanding it?");

@@ -50,7 +50,10 @@ void Observer::take_message(const ArmMessage& message) {
 
 void Observer::take_frame(const CapturedFrame& captured) {
   // A frame that was waiting for a body is overdue in either order.
-  if (!other_is_complete_) in_other_order_.overdue(captured.arrival_ns, other_frame_);
+  if (client_.experiment().transport.mocap.source.network)
+    other_frame_ = captured.frame;  // the protocol gives the order
+  else if (!other_is_complete_)
+    in_other_order_.overdue(captured.arrival_ns, other_frame_);
   other_is_complete_ = false;
   const auto bodies = client_.experiment().arm.size() + 1;
   const auto& body = captured.frame.body;

@@ -198,7 +198,7 @@ Finding check_order(const Experiment& experiment, const MeanPoses& rest) {
   for (const std::size_t body : line.order) ids.push_back(id(body));
   out.fix = "exchange them in daemon.bodies or in the motion capture";
   if (ids.size() == rest.body.size() && bodies.base_id >= 0 &&
-      !experiment.transport.mocap.source.channel_per_body)
+      !experiment.transport.mocap.source.named())
     out.fix = fmt::format("daemon.bodies: {{base_id: {}, segment_ids: [{}]}}", ids.front(),
                           fmt::join(ids.begin() + 1, ids.end(), ", "));
   return out;

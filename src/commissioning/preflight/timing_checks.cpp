@@ -10,6 +10,7 @@
 #include "softarm/commissioning/preflight/checks.hpp"
 #include "softarm/runtime/safety_monitor.hpp"
 #include "softarm/runtime/settings.hpp"
+#include "softarm/transport/mocap_source.hpp"
 #include "softarm/transport/settings.hpp"
 
 namespace softarm {
@@ -29,6 +30,11 @@ std::string body_name(std::size_t index, const TransportSettings& transport) {
         "{} (channel {})", what,
         body_channel(transport.lcm, index == 0 ? bodies.base_marker_frame
                                                : bodies.segment_marker_frames[index - 1]));
+  const MarkerFrameSettings* const frame = index == 0 ? &bodies.base_marker_frame
+                                           : index <= bodies.segment_marker_frames.size()
+                                               ? &bodies.segment_marker_frames[index - 1]
+                                               : nullptr;
+  if (frame != nullptr && !frame->name.empty()) return fmt::format("{} ({})", what, frame->name);
   return fmt::format("{} (id {})", what,
                      index == 0 ? bodies.base_id : bodies.segment_ids[index - 1]);
 }
@@ -38,16 +44,20 @@ std::string id_list(const std::vector<int>& ids) { return fmt::format("{}", fmt:
 Finding check_bodies(const Experiment& experiment, const Observation& seen) {
   Finding out{.check = kBodies};
   const LcmSettings& lcm = experiment.transport.lcm;
-  const std::string channels = fmt::format("{}", fmt::join(seen.channels, ", "));
+  const bool has_server = experiment.transport.mocap.source.network.has_value();
+  const std::string channels = has_server ? mocap_place(experiment.transport)
+                                          : fmt::format("{}", fmt::join(seen.channels, ", "));
   const double listened_s = to_seconds(seen.rest_end_ns - seen.start_ns);
   if (seen.frames.empty()) {
     out.verdict = Verdict::fail;
     out.text = fmt::format("no frame on {} within {:.1f} s", channels, listened_s);
     if (seen.not_frames > 0)
       out.text += fmt::format(", but {} packets that are not frames", seen.not_frames);
-    out.fix = fmt::format(
-        "start the sender of frames, or fix daemon.mocap.source; it must publish on {} at {}",
-        channels, lcm.url);
+    out.fix = has_server ? "start the server and its streaming of rigid bodies, or fix daemon.mocap"
+                         : fmt::format(
+                               "start the sender of frames, or fix daemon.mocap.source; it must "
+                               "publish on {} at {}",
+                               channels, lcm.url);
     return out;
   }
   const auto count = static_cast<int>(seen.frames.front().body.size());

@@ -50,7 +50,7 @@ std::string calibration_text(const Experiment& experiment, const RestCalibration
 
 /// An experiment file that includes `config` and has the marker frames; `note` becomes its first
 /// line.
-std::string calibrated_yaml(const Experiment& experiment, const RestCalibration& found,
-                            const std::string& note, const std::string& config);
+std::string calibrated_yaml(const RestCalibration& found, const std::string& note,
+                            const std::string& config);
 
 }  // namespace softarm

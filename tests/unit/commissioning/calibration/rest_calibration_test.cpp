@@ -237,9 +237,9 @@ TEST_F(Calibration, WhatIsWrittenLoads) {
   const RestCalibration found =
       calibrate_rest(experiment, look(100, 0.0), BaseSource::marker_frame);
   const TestFolder folder;
-  const auto file = folder.write(
-      "calibrated.yaml",
-      calibrated_yaml(experiment, found, "a note", SOFTARM_SOURCE_DIR "/config/paper_arm.yaml"));
+  const auto file =
+      folder.write("calibrated.yaml",
+                   calibrated_yaml(found, "a note", SOFTARM_SOURCE_DIR "/config/paper_arm.yaml"));
   const BodySettings loaded = load_experiment(file).transport.bodies;
   for (std::size_t i = 0; i < 3; ++i) {
     const auto [metres, radians] =

@@ -1,0 +1,132 @@
+#include "apps/softarm/closed_loop_run.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <signal.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <system_error>
+
+#include "apps/progress.hpp"
+#include "apps/signals.hpp"
+#include "softarm/client/arm_client.hpp"
+#include "softarm/config/load.hpp"
+#include "softarm/recording/status_record.hpp"
+
+namespace softarm {
+namespace {
+
+namespace fs = std::filesystem;
+constexpr double kStart_s = 10.0;        ///< until the first status
+constexpr double kSettle_s = 1.0;        ///< of ACTIVE before errors count
+constexpr double kLongestWait_s = 20.0;  ///< not ACTIVE, in all
+
+/// softarmd as a child; ended, which vents the arm, at the latest with this object.
+class Daemon {
+ public:
+  Daemon(const fs::path& config, const fs::path& output) {
+    const std::string program = fs::read_symlink("/proc/self/exe").parent_path() / "softarmd";
+    const std::string file = config.string();
+    char* const arguments[] = {const_cast<char*>(program.c_str()), const_cast<char*>(file.c_str()),
+                               nullptr};
+    posix_spawn_file_actions_t actions;
+    posix_spawn_file_actions_init(&actions);
+    posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, output.c_str(),
+                                     O_WRONLY | O_CREAT | O_TRUNC, 0644);
+    posix_spawn_file_actions_adddup2(&actions, STDOUT_FILENO, STDERR_FILENO);
+    // In a separate process group: a Ctrl-C is for us, who then disarm it.
+    posix_spawnattr_t attributes;
+    posix_spawnattr_init(&attributes);
+    posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);
+    const int error =
+        posix_spawn(&child_, program.c_str(), &actions, &attributes, arguments, environ);
+    posix_spawnattr_destroy(&attributes);
+    posix_spawn_file_actions_destroy(&actions);
+    if (error != 0) throw std::system_error(error, std::generic_category(), program);
+  }
+  ~Daemon() {
+    if (!runs()) return;
+    kill(child_, SIGTERM);
+    waitpid(child_, nullptr, 0);  // it ends when the arm is vented
+  }
+  Daemon(const Daemon&) = delete;
+  Daemon& operator=(const Daemon&) = delete;
+
+  bool runs() {
+    if (child_ > 0 && waitpid(child_, nullptr, WNOHANG) == child_) child_ = 0;
+    return child_ > 0;
+  }
+
+ private:
+  pid_t child_ = 0;
+};
+
+/// Errors of the estimate, status by status.
+struct Errors {
+  double sum = 0.0;
+  std::int64_t count = 0;
+
+  void add(const ArmStatus& status, double active_s) {
+    if (status.shadow || status.mode != Mode::active || active_s < kSettle_s) return;
+    const double square = (status.reference_u_rad - status.u_rad).squaredNorm();
+    if (!std::isfinite(square)) return;
+    sum += square / status.segments();
+    ++count;
+  }
+  double rms() const { return count > 0 ? std::sqrt(sum / static_cast<double>(count)) : NAN; }
+};
+
+/// Arms, and waits for `duration_s` of ACTIVE. Returns why not.
+std::string follow(OperatorClient& client, Daemon& daemon, StatusRecord& record,
+                   double duration_s) {
+  if (!client.wait_for_status(kStart_s)) return "softarmd gives no status";
+  if (client.request(OperatorRequest::arm) != RequestOutcome::done)
+    return "softarmd does not arm; it is in " + client.daemon_text();
+  Progress progress(true);
+  const double begin_s = record.time_s();
+  while (record.active_s() < duration_s) {
+    if (stop_requested != 0) return "stopped";
+    if (!daemon.runs()) return "softarmd has ended";
+    if (!record.failure().empty()) return record.failure();
+    client.wait_for_status(0.5);
+    const Mode mode = client.status()->mode;
+    if (mode == Mode::fault || (mode == Mode::vent && record.active_s() > 0.0))
+      return "the arm was vented: " + client.daemon_text();
+    if (record.time_s() - begin_s - record.active_s() > kLongestWait_s)
+      return "the arm does not become ACTIVE; softarmd is in " + client.daemon_text();
+    progress.update(
+        fmt::format("{} {:.0f} of {:.0f} s", client.daemon_text(), record.active_s(), duration_s));
+  }
+  return {};
+}
+
+}  // namespace
+
+ClosedLoopRun run_closed_loop(const fs::path& config, const fs::path& folder, double duration_s) {
+  const Experiment experiment = load_experiment(config);
+  fs::create_directories(folder);
+  StatusRecord record(experiment, folder);
+  Errors errors;
+  OperatorClient client(experiment.transport.lcm);
+  client.record(folder / "run.log");
+  client.on_message(
+      [&](const ArmMessage& message) { record.take(message.channel, message.bytes); });
+  client.on_status([&](const ArmStatus& status) { errors.add(status, record.active_s()); });
+  ClosedLoopRun run;
+  {
+    Daemon daemon(config, folder / "softarmd.txt");
+    run.failure = follow(client, daemon, record, duration_s);
+    client.request(OperatorRequest::disarm);
+  }
+  client.update(client.now_ns());
+  client.stop_recording();
+  record.close();
+  run.error_rms_rad = errors.rms();
+  run.table = record.table();
+  return run;
+}
+
+}  // namespace softarm
