@@ -23,6 +23,8 @@ constexpr std::array kUnits = std::to_array<std::pair<std::string_view, std::str
     {"_ns_per_m", "N s/m"},
     {"_n_per_m", "N/m"},
     {"_bar_per_s", "bar/s"},
+    {"_m_per_bar", "m/bar"},
+    {"_1pbar", "1/bar"},
     {"_per_bar", "1/bar"},
     {"_per_sqrt_s", "1/s^0.5"},
     {"_radps", "rad/s"},

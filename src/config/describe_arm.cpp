@@ -216,10 +216,12 @@ static void describe_memory(Keys& key, IdentificationSettings& it, std::size_t c
       "of every chamber, generalized force in u, in any direction; 0: as actuation has it");
   it.fill_lag_s.resize(chambers, 0.0);
   it.vent_lag_s.resize(chambers, 0.0);
-  KEY(fill_lag_s, from(0, 100).one_or_each(), "of every chamber, where its pressure rises; 0: lag_s");
+  KEY(fill_lag_s, from(0, 100).one_or_each(),
+      "of every chamber, where its pressure rises; 0: lag_s");
   KEY(vent_lag_s, from(0, 100).one_or_each(), "the same where it falls");
   it.saturation_1pbar.resize(chambers, 0.0);
-  KEY(saturation_1pbar, from(-100, 100).one_or_each(), "of every chamber, q: p counts as p (1 + q p)");
+  KEY(saturation_1pbar, from(-100, 100).one_or_each(),
+      "of every chamber, q: p counts as p (1 + q p)");
   KEY(stiffening_1pbar, from(-100, 100), "s: k counts as k (1 + s sum of the segment's pressures)");
   it.cross_nm_per_bar.resize(2 * n * chambers, 0.0);
   KEY(cross_nm_per_bar, from(-1e4, 1e4).one_or_each(),
@@ -306,11 +308,10 @@ void describe(Keys& key, Experiment& it) {
   key.section({"plant", "the simulated arm; left out: the arm as the controller models it"},
               [&] { describe_plant(key, it); });
   KEY(run, "defaults of a simulated run");
-  key.section({"identification", "the steps and the findings of `softarm identify`"},
-              [&] {
-                describe_identification(key, it.identification, it.motion_limits,
-                                        static_cast<std::size_t>(chamber_count(it.actuation)));
-              });
+  key.section({"identification", "the steps and the findings of `softarm identify`"}, [&] {
+    describe_identification(key, it.identification, it.motion_limits,
+                            static_cast<std::size_t>(chamber_count(it.actuation)));
+  });
 }
 
 }  // namespace softarm

@@ -15,12 +15,13 @@ namespace {
 
 struct RecordingsOptions {
   ArenaOptions arena;
-  std::string data;
+  std::string data, out;
   bool json = false;
 };
 
 void measure(RecordingsOptions options) {
   options.arena.data = options.data;
+  options.arena.out = options.out;
   options.arena.config = shared_file("config", SOFTARM_CONFIG_FOLDER);
   options.arena.threads = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
   std::string text;
@@ -47,6 +48,8 @@ void add_bench_recordings_command(CLI::App& group) {
       ->required()
       ->check(CLI::ExistingDirectory);
   command->add_flag("--json", options->json, "print JSON instead of a table");
+  command->add_option("--out", options->out,
+                      "folder for measured and predicted motions, for tools/plot_recordings.py");
   command->add_option("--only", options->arena.only, "recordings whose name contains this");
   command->callback([options] { measure(*options); });
 }

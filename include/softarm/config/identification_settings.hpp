@@ -17,7 +17,7 @@ struct IdentificationSettings {
   double lag_s = 0.0;
   double dead_time_s = 0.0;
   double load_kg = 0.0;  ///< a point mass at the tip
-  bool inertia = true;  ///< false: none, for quasi-static motion
+  bool inertia = true;   ///< false: none, for quasi-static motion
   // Of every chamber; all 0: none.
   std::vector<double> push_nm_per_bar;  ///< pairs, generalized force in u; all 0: as `actuation`
   std::vector<double> fill_lag_s, vent_lag_s;  ///< all 0: lag_s

@@ -61,8 +61,9 @@ int identify(IdentifyCommand& command) {
   for (const std::string& log : command.held_out)
     held_out.push_back(record_of(experiment, log, command));
   if (records.size() > 1 && (command.linear || command.compare)) {
-    print_error("softarm", "several logs: expected neither --linear nor --compare; --choose-terms "
-                           "compares terms on several logs");
+    print_error("softarm",
+                "several logs: expected neither --linear nor --compare; --choose-terms "
+                "compares terms on several logs");
     return kExitUsage;
   }
   const ParameterSet set(configured(experiment), experiment.actuation.kind, command.choice);
@@ -100,8 +101,7 @@ int identify(IdentifyCommand& command) {
                                      command.choice, records, fit, command.options.refinement);
   widen(misfit, fit);
   fmt::print("{}{}{}", fit_table(set, fit), conditioning_text(set, fit), misfit_text(misfit));
-  if (command.logs.size() == 1)
-    fmt::print("{}", residual_parts_text(residual_parts(record, fit)));
+  if (command.logs.size() == 1) fmt::print("{}", residual_parts_text(residual_parts(record, fit)));
   print_held_out(set.arm(fit.x), experiment, held_out, command);
   write_findings(experiment, command, set.arm(fit.x), fit, findings);
   return kExitOk;

@@ -37,13 +37,13 @@ void write_findings(const Experiment& experiment, const IdentifyCommand& command
   const std::string note = fmt::format(
       "Identified by softarm {} from {}: residual {:.3g} mrad rms of a motion of {:.3g} mrad rms.",
       version_text(),
-      command.live          ? "steps on the running arm"
+      command.live           ? "steps on the running arm"
       : command.logs.empty() ? "steps on the simulated arm"
                              : fmt::format("{}", fmt::join(command.logs, ", ")),
       1e3 * fit.rms_rad, 1e3 * fit.motion_rms_rad);
   OutputFile& output = *findings.experiment;
-  output.write(identified_yaml(experiment, arm, command.choice, note, command.config,
-                               output.partial()));
+  output.write(
+      identified_yaml(experiment, arm, command.choice, note, command.config, output.partial()));
   output.flush();
   load_experiment(output.partial());
   output.commit();

@@ -16,7 +16,7 @@ namespace softarm {
 struct IdentifyCommand {
   std::string config, output, out;
   std::vector<std::string> logs, held_out;  ///< to identify from, and to judge by
-  std::string damage;  ///< of the log, found while it is read
+  std::string damage;                       ///< of the log, found while it is read
   LoggedInput input = LoggedInput::commanded;
   FitChoice choice;
   StepPlan plan;

@@ -24,9 +24,8 @@ void run_import(const ImportOptions& options) {
   const ImportSummary summary =
       shared ? import_recording(recording,
                                 marker_frames(read_mapped_table(
-                                    options.frames_from, options.frames_map.empty()
-                                                             ? options.map
-                                                             : options.frames_map)),
+                                    options.frames_from,
+                                    options.frames_map.empty() ? options.map : options.frames_map)),
                                 options.out)
              : import_recording(recording, options.out);
   fmt::print("{} rows over {:.3f} s: {} frames, {} repeated, {} missing, {} with a body not seen\n",

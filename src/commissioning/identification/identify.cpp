@@ -45,9 +45,9 @@ Refinement identify(const ParameterSet& set, std::span<const MotionRecord> recor
     least = found;
   };
   if (!set.of_elongation())
-    consider(fit_linear_and_lag(set, records.front(), expected, options.window_s,
-                                options.longest_lag_s)
-                 .x);
+    consider(
+        fit_linear_and_lag(set, records.front(), expected, options.window_s, options.longest_lag_s)
+            .x);
   for (const ArmHypothesis& arm : options.near) {
     // What the other arm leaves out starts where it is expected.
     Eigen::VectorXd x = set.of(arm);

@@ -147,7 +147,8 @@ class LogReader {
     const Eigen::MatrixXd rows = frames_.rows(5 * n);
     out.u_rad = rows.leftCols(2 * n);
     out.chord_m = rows.rightCols(3 * n);
-    out.noise_rad = std::sqrt(variance_rad2_ / static_cast<double>(frames_.time_s.size() * static_cast<std::size_t>(n)));
+    out.noise_rad = std::sqrt(
+        variance_rad2_ / static_cast<double>(frames_.time_s.size() * static_cast<std::size_t>(n)));
     out.input.time_s = inputs_.times().array() - frames_.time_s.front();
     out.input.value = inputs_.rows(static_cast<Eigen::Index>(chambers_));
     out.input.held = input_ == LoggedInput::commanded;

@@ -20,9 +20,9 @@ struct Candidate {
   bool FitChoice::*flag;
 };
 constexpr Candidate kCandidates[] = {
-    {"load at the tip", &FitChoice::load},  {"length", &FitChoice::length},
-    {"masses", &FitChoice::mass},           {"hysteresis", &FitChoice::hysteresis},
-    {"rest offset", &FitChoice::rest},      {"cubic stiffness", &FitChoice::cubic},
+    {"load at the tip", &FitChoice::load}, {"length", &FitChoice::length},
+    {"masses", &FitChoice::mass},          {"hysteresis", &FitChoice::hysteresis},
+    {"rest offset", &FitChoice::rest},     {"cubic stiffness", &FitChoice::cubic},
 };
 
 }  // namespace
@@ -54,8 +54,8 @@ Misfit judge_misfit(const ArmHypothesis& start, ActuationKind kind, const FitCho
     with.*candidate.flag = true;
     ArmHypothesis from = start;
     if (candidate.flag == &FitChoice::hysteresis && from.slip_springs.empty())
-      from.slip_springs = {{kRadius * fit.motion_rms_rad,
-                            kSlip * from.arm.segments[0].stiffness_nm_per_rad}};
+      from.slip_springs = {
+          {kRadius * fit.motion_rms_rad, kSlip * from.arm.segments[0].stiffness_nm_per_rad}};
     const ParameterSet wider(from, kind, with);
     // The unknowns of both are in the same order, but for what was added.
     Eigen::VectorXd x = wider.expected();
@@ -77,13 +77,12 @@ Misfit judge_misfit(const ArmHypothesis& start, ActuationKind kind, const FitCho
     try {
       const Refinement tried = refine(wider, records, x, quick);
       if (!(tried.rms_rad < kExplains * fit.rms_rad)) continue;
-      Tried it{{candidate.name, tried.x[added] * wider[added].scale, wider[added].unit,
-                tried.rms_rad},
-               Eigen::VectorXd::Zero(set.size())};
+      Tried it{
+          {candidate.name, tried.x[added] * wider[added].scale, wider[added].unit, tried.rms_rad},
+          Eigen::VectorXd::Zero(set.size())};
       for (Eigen::Index i = 0; i < set.size(); ++i) {
         const Eigen::Index j = common[static_cast<std::size_t>(i)];
-        if (j >= 0)
-          it.shift[i] = std::abs(tried.x[j] * wider[j].scale / set[i].scale - fit.x[i]);
+        if (j >= 0) it.shift[i] = std::abs(tried.x[j] * wider[j].scale / set[i].scale - fit.x[i]);
       }
       all.push_back(std::move(it));
     } catch (const std::runtime_error&) {
@@ -109,13 +108,14 @@ void widen(const Misfit& misfit, Refinement& fit) {
 std::string misfit_text(const Misfit& misfit) {
   if (!misfit.significant) return "";
   std::string text = fmt::format(
-      "THE ARM IS NOT AS MODELLED: the residual is {:.3g} times the noise configured for the frames "
+      "THE ARM IS NOT AS MODELLED: the residual is {:.3g} times the noise configured for the "
+      "frames "
       "({:.3g} mrad)\n",
       misfit.ratio, 1e3 * misfit.noise_rad);
   for (const MisfitCause& cause : misfit.causes)
     text += fmt::format("{}: {} ({:.4g} {}), which leaves {:.3g} times\n",
-                        &cause == &misfit.causes.front() ? "likely cause" : "or",
-                        cause.name, cause.value, cause.unit == "1" ? "times" : cause.unit,
+                        &cause == &misfit.causes.front() ? "likely cause" : "or", cause.name,
+                        cause.value, cause.unit == "1" ? "times" : cause.unit,
                         cause.rms_rad / misfit.noise_rad);
   if (misfit.causes.empty()) return text + "no cause was found; intervals count noise only\n";
   return text + "intervals are widened by what these causes would change; free one to know more\n";

@@ -17,12 +17,12 @@ constexpr double kLagScale_s = 0.1, kDelayScale_s = 0.05, kRestScale_rad = 0.1;
 constexpr double kFill_s = 0.1, kVent_s = 0.3;  ///< where no lag is configured, the prior's
 constexpr double kLongest_s = 10.0;             ///< lag of a chamber
 constexpr double kSaturation_1pbar = 0.5, kMostSaturation_1pbar = 2.0, kStiffening_1pbar = 0.5;
-constexpr double kSlip = 0.1, kSlipScale = 0.3;        ///< of k, a slip spring
+constexpr double kSlip = 0.1, kSlipScale = 0.3;         ///< of k, a slip spring
 constexpr double kRemanent = 0.2, kRemanence_s = 20.0;  ///< share and time
 constexpr double kRemanentScale_rad = 0.05, kCross = 0.15;
 constexpr double kStretch_mpbar = 0.02, kOffsetScale_m = 0.02, kFrictionScale_m = 2e-3;
 constexpr double kLeastLoad_kg = 1e-3;  ///< scale of a load
-constexpr double kCoarse = 1e-3;  ///< difference for what makes kinks
+constexpr double kCoarse = 1e-3;        ///< difference for what makes kinks
 
 constexpr double kUnbounded = -std::numeric_limits<double>::infinity();
 
@@ -183,7 +183,8 @@ void ParameterSet::add_lags(const FitChoice& choice) {
       const double expected_s = vent ? kVent_s : kFill_s;
       Parameter it{fmt::format("{}{}", vent ? "venting" : "filling",
                                count > 1 ? fmt::format(", chamber {}", j + 1) : ""),
-                   "s", 2.0 * expected_s,
+                   "s",
+                   2.0 * expected_s,
                    [=](const ArmHypothesis& arm) {
                      return arm.lags.empty() ? arm.lag_s : arm.lags[j].*member;
                    },
@@ -215,71 +216,77 @@ void ParameterSet::add_memory(const FitChoice& choice) {
   if (choice.saturation) {
     if (start_.saturation_1pbar.size() != inputs) start_.saturation_1pbar.setZero(inputs);
     for (Eigen::Index j = 0; j < inputs; ++j)
-      number(fmt::format("saturation, chamber {}", j + 1), "1/bar", kSaturation_1pbar,
-             [=](const ArmHypothesis& arm) {
-               return arm.saturation_1pbar.size() > j ? arm.saturation_1pbar[j] : 0.0;
-             },
-             [=](ArmHypothesis& arm, double value) {
-               if (arm.saturation_1pbar.size() != inputs) arm.saturation_1pbar.setZero(inputs);
-               arm.saturation_1pbar[j] = value;
-             },
-             -kMostSaturation_1pbar, kMostSaturation_1pbar, none);
+      number(
+          fmt::format("saturation, chamber {}", j + 1), "1/bar", kSaturation_1pbar,
+          [=](const ArmHypothesis& arm) {
+            return arm.saturation_1pbar.size() > j ? arm.saturation_1pbar[j] : 0.0;
+          },
+          [=](ArmHypothesis& arm, double value) {
+            if (arm.saturation_1pbar.size() != inputs) arm.saturation_1pbar.setZero(inputs);
+            arm.saturation_1pbar[j] = value;
+          },
+          -kMostSaturation_1pbar, kMostSaturation_1pbar, none);
   }
   if (choice.hysteresis)
     for (std::size_t i = 0; i < start_.slip_springs.size(); ++i)
-      number(fmt::format("slip spring of {:.3g} mrad", 1e3 * start_.slip_springs[i].radius_rad),
-             "N m/rad", kSlipScale * k,
-             [=](const ArmHypothesis& arm) {
-               return arm.slip_springs.size() > i ? arm.slip_springs[i].stiffness_nm_per_rad : 0.0;
-             },
-             [i, springs = start_.slip_springs](ArmHypothesis& arm, double value) {
-               if (arm.slip_springs.size() != springs.size()) arm.slip_springs = springs;
-               arm.slip_springs[i].stiffness_nm_per_rad = value;
-             },
-             0.0, inf, start_.slip_springs[i].stiffness_nm_per_rad > 0.0 ? none : kSlip * k);
+      number(
+          fmt::format("slip spring of {:.3g} mrad", 1e3 * start_.slip_springs[i].radius_rad),
+          "N m/rad", kSlipScale * k,
+          [=](const ArmHypothesis& arm) {
+            return arm.slip_springs.size() > i ? arm.slip_springs[i].stiffness_nm_per_rad : 0.0;
+          },
+          [i, springs = start_.slip_springs](ArmHypothesis& arm, double value) {
+            if (arm.slip_springs.size() != springs.size()) arm.slip_springs = springs;
+            arm.slip_springs[i].stiffness_nm_per_rad = value;
+          },
+          0.0, inf, start_.slip_springs[i].stiffness_nm_per_rad > 0.0 ? none : kSlip * k);
   if (choice.stiffening)
-    number("stiffening", "1/bar", kStiffening_1pbar,
-           [](const ArmHypothesis& arm) { return arm.stiffening_1pbar; },
-           [](ArmHypothesis& arm, double value) { arm.stiffening_1pbar = value; }, kUnbounded, inf,
-           none);
+    number(
+        "stiffening", "1/bar", kStiffening_1pbar,
+        [](const ArmHypothesis& arm) { return arm.stiffening_1pbar; },
+        [](ArmHypothesis& arm, double value) { arm.stiffening_1pbar = value; }, kUnbounded, inf,
+        none);
   if (choice.remanence) {
-    if (start_.remanent_rad.size() != start_.arm.dof()) start_.remanent_rad.setZero(start_.arm.dof());
-    number("remanence", "1", kRemanent,
-           [](const ArmHypothesis& arm) { return arm.remanence.share; },
-           [](ArmHypothesis& arm, double value) { arm.remanence.share = value; }, 0.0, 0.9,
-           start_.remanence.share > 0.0 ? none : 0.25 * kRemanent);
-    number("time of remanence", "s", kRemanence_s,
-           [](const ArmHypothesis& arm) { return arm.remanence.time_s; },
-           [](ArmHypothesis& arm, double value) { arm.remanence.time_s = value; }, 1.0, 300.0, none);
+    if (start_.remanent_rad.size() != start_.arm.dof())
+      start_.remanent_rad.setZero(start_.arm.dof());
+    number(
+        "remanence", "1", kRemanent, [](const ArmHypothesis& arm) { return arm.remanence.share; },
+        [](ArmHypothesis& arm, double value) { arm.remanence.share = value; }, 0.0, 0.9,
+        start_.remanence.share > 0.0 ? none : 0.25 * kRemanent);
+    number(
+        "time of remanence", "s", kRemanence_s,
+        [](const ArmHypothesis& arm) { return arm.remanence.time_s; },
+        [](ArmHypothesis& arm, double value) { arm.remanence.time_s = value; }, 1.0, 300.0, none);
     for (Eigen::Index c = 0; c < start_.arm.dof(); ++c)
-      number(fmt::format("remanent {} at first, segment {}", c % 2 == 0 ? "u1" : "u2", c / 2 + 1),
-             "rad", kRemanentScale_rad,
-             [=](const ArmHypothesis& arm) {
-               return arm.remanent_rad.size() > c ? arm.remanent_rad[c] : 0.0;
-             },
-             [=, dof = start_.arm.dof()](ArmHypothesis& arm, double value) {
-               if (arm.remanent_rad.size() != dof) arm.remanent_rad.setZero(dof);
-               arm.remanent_rad[c] = value;
-             },
-             kUnbounded, inf, none);
+      number(
+          fmt::format("remanent {} at first, segment {}", c % 2 == 0 ? "u1" : "u2", c / 2 + 1),
+          "rad", kRemanentScale_rad,
+          [=](const ArmHypothesis& arm) {
+            return arm.remanent_rad.size() > c ? arm.remanent_rad[c] : 0.0;
+          },
+          [=, dof = start_.arm.dof()](ArmHypothesis& arm, double value) {
+            if (arm.remanent_rad.size() != dof) arm.remanent_rad.setZero(dof);
+            arm.remanent_rad[c] = value;
+          },
+          kUnbounded, inf, none);
   }
   if (choice.cross && start_.arm.size() > 1) {
     const Eigen::Index dof = start_.arm.dof();
     if (start_.cross_nm_per_bar.size() == 0) start_.cross_nm_per_bar.setZero(dof, inputs);
     for (Eigen::Index j = 0; j < inputs; ++j)
       for (Eigen::Index c = 0; c < dof; ++c) {
-        if (start_.segment_of[static_cast<std::size_t>(j)] == c / 2) continue;
-        number(fmt::format("chamber {} on {}, segment {}", j + 1, c % 2 == 0 ? "u1" : "u2",
-                           c / 2 + 1),
-               "N m/bar", kCross * k,
-               [=](const ArmHypothesis& arm) {
-                 return arm.cross_nm_per_bar.size() > 0 ? arm.cross_nm_per_bar(c, j) : 0.0;
-               },
-               [=](ArmHypothesis& arm, double value) {
-                 if (arm.cross_nm_per_bar.size() == 0) arm.cross_nm_per_bar.setZero(dof, inputs);
-                 arm.cross_nm_per_bar(c, j) = value;
-               },
-               kUnbounded, inf, none);
+        if (start_.segment_of[static_cast<std::size_t>(j)] <= c / 2) continue;
+        number(
+            fmt::format("chamber {} on {}, segment {}", j + 1, c % 2 == 0 ? "u1" : "u2", c / 2 + 1),
+            "N m/bar", kCross * k,
+            [=](const ArmHypothesis& arm) {
+              return arm.cross_nm_per_bar.size() > 0 ? arm.cross_nm_per_bar(c, j) : 0.0;
+            },
+            [=](ArmHypothesis& arm, double value) {
+              if (arm.cross_nm_per_bar.size() == 0) arm.cross_nm_per_bar.setZero(dof, inputs);
+              arm.cross_nm_per_bar(c, j) = value;
+            },
+            kUnbounded, inf, none);
       }
   }
 }
@@ -287,7 +294,9 @@ void ParameterSet::add_memory(const FitChoice& choice) {
 void ParameterSet::add_masses(const FitChoice& choice) {
   const auto factor = [&](const char* name, double SegmentParameters::*member) {
     const double first = start_.arm.segments[0].*member;
-    Parameter it{name, "1", 1.0,
+    Parameter it{name,
+                 "1",
+                 1.0,
                  [=](const ArmHypothesis& arm) { return arm.arm.segments[0].*member / first; },
                  [=, segments = start_.arm.segments](ArmHypothesis& arm, double value) {
                    for (std::size_t i = 0; i < segments.size(); ++i)
@@ -321,7 +330,9 @@ void ParameterSet::add_elongation(const FitChoice& choice) {
   const double none = std::numeric_limits<double>::quiet_NaN(), inf = -kUnbounded;
   const auto number = [&](std::string name, const char* unit, double scale, auto member,
                           double lowest, double highest, double expected) {
-    Parameter one{std::move(name), unit, scale,
+    Parameter one{std::move(name),
+                  unit,
+                  scale,
                   [=](const ArmHypothesis& arm) { return member(arm.elongation); },
                   [=](ArmHypothesis& arm, double value) { member(arm.elongation) = value; },
                   lowest};
@@ -331,14 +342,17 @@ void ParameterSet::add_elongation(const FitChoice& choice) {
     parameters_.push_back(std::move(one));
   };
   for (Eigen::Index i = 0; i < n; ++i)
-    number(fmt::format("length without pressure, segment {}", i + 1), "m", kOffsetScale_m,
-           [=](auto& e) -> auto& { return e.offset_m[i]; }, 0.0, inf, none);
+    number(
+        fmt::format("length without pressure, segment {}", i + 1), "m",
+        kOffsetScale_m, [=](auto& e) -> auto& { return e.offset_m[i]; }, 0.0, inf, none);
   for (Eigen::Index i = 0; i < n; ++i)
     for (Eigen::Index j = 0; j < inputs; ++j) {
-      if (!choice.cross && start_.segment_of[static_cast<std::size_t>(j)] != i) continue;
-      number(fmt::format("stretch of segment {}, chamber {}", i + 1, j + 1), "m/bar",
-             kStretch_mpbar, [=](auto& e) -> auto& { return e.gain_m_per_bar(i, j); }, kUnbounded,
-             inf, none);
+      const int own = start_.segment_of[static_cast<std::size_t>(j)];
+      if (choice.cross ? own < i : own != i) continue;
+      number(
+          fmt::format("stretch of segment {}, chamber {}", i + 1, j + 1), "m/bar",
+          kStretch_mpbar, [=](auto& e) -> auto& { return e.gain_m_per_bar(i, j); }, kUnbounded, inf,
+          none);
     }
   const std::size_t count = choice.chamber_lags ? it.lags.size() : 1;
   for (const bool vent : {false, true})
@@ -347,7 +361,8 @@ void ParameterSet::add_elongation(const FitChoice& choice) {
       const double expected_s = vent ? kVent_s : kFill_s;
       Parameter one{fmt::format("{}{}", vent ? "shortening" : "lengthening",
                                 count > 1 ? fmt::format(", chamber {}", j + 1) : ""),
-                    "s", 2.0 * expected_s,
+                    "s",
+                    2.0 * expected_s,
                     [=](const ArmHypothesis& arm) { return arm.elongation.lags[j].*time; },
                     [=](ArmHypothesis& arm, double value) {
                       for (std::size_t k = 0; k < arm.elongation.lags.size(); ++k)
@@ -361,19 +376,21 @@ void ParameterSet::add_elongation(const FitChoice& choice) {
     }
   if (choice.saturation)
     for (Eigen::Index j = 0; j < inputs; ++j)
-      number(fmt::format("saturation of stretch, chamber {}", j + 1), "1/bar", kSaturation_1pbar,
-             [=](auto& e) -> auto& { return e.saturation_1pbar[j]; }, -kMostSaturation_1pbar,
-             kMostSaturation_1pbar, none);
+      number(
+          fmt::format("saturation of stretch, chamber {}", j + 1), "1/bar",
+          kSaturation_1pbar, [=](auto& e) -> auto& { return e.saturation_1pbar[j]; },
+          -kMostSaturation_1pbar, kMostSaturation_1pbar, none);
   if (choice.hysteresis)
-    number("friction of stretch", "m", kFrictionScale_m,
-           [](auto& e) -> auto& { return e.friction_m; }, 0.0, inf,
-           it.friction_m > 0.0 ? none : 0.25 * kFrictionScale_m);
+    number(
+        "friction of stretch", "m", kFrictionScale_m, [](auto& e) -> auto& { return e.friction_m; },
+        0.0, inf, it.friction_m > 0.0 ? none : 0.25 * kFrictionScale_m);
   if (choice.remanence) {
-    number("remanence of stretch", "1", kRemanent,
-           [](auto& e) -> auto& { return e.remanence.share; }, 0.0, inf,
-           it.remanence.share > 0.0 ? none : 0.25 * kRemanent);
-    number("its time", "s", kRemanence_s, [](auto& e) -> auto& { return e.remanence.time_s; }, 1.0,
-           300.0, none);
+    number(
+        "remanence of stretch", "1", kRemanent, [](auto& e) -> auto& { return e.remanence.share; },
+        0.0, inf, it.remanence.share > 0.0 ? none : 0.25 * kRemanent);
+    number(
+        "its time", "s", kRemanence_s, [](auto& e) -> auto& { return e.remanence.time_s; }, 1.0,
+        300.0, none);
   }
 }
 
@@ -418,8 +435,6 @@ bool ParameterSet::possible(const Eigen::VectorXd& x) const {
   return springs && tried.lag_s >= 0.0;
 }
 
-bool ParameterSet::linear(Eigen::Index i) const {
-  return (*this)[i].linear;
-}
+bool ParameterSet::linear(Eigen::Index i) const { return (*this)[i].linear; }
 
 }  // namespace softarm

@@ -15,11 +15,10 @@ constexpr int kMostRounds = 30;
 
 // Alexander's method of order 3: gamma is the root of x^3 - 3 x^2 + 3 x / 2 - 1/6 in (1/6, 1/2).
 constexpr double kGamma = 0.435866521508459;
-constexpr double kWeights[3][3] = {
-    {kGamma, 0.0, 0.0},
-    {0.5 * (1.0 - kGamma), kGamma, 0.0},
-    {-0.25 * (6.0 * kGamma * kGamma - 16.0 * kGamma + 1.0),
-     0.25 * (6.0 * kGamma * kGamma - 20.0 * kGamma + 5.0), kGamma}};
+constexpr double kWeights[3][3] = {{kGamma, 0.0, 0.0},
+                                   {0.5 * (1.0 - kGamma), kGamma, 0.0},
+                                   {-0.25 * (6.0 * kGamma * kGamma - 16.0 * kGamma + 1.0),
+                                    0.25 * (6.0 * kGamma * kGamma - 20.0 * kGamma + 5.0), kGamma}};
 
 }  // namespace
 

@@ -43,10 +43,10 @@ class QuasiStaticMotion {
   DynamicsWorkspace workspace_;
   bool heavy_ = false;
   Eigen::MatrixXd gravity_slope_;
-  Eigen::VectorXd damping_, stiffness_;     ///< of every coordinate; stiffness as pressures make it
-  Eigen::VectorXd input_, force_, rest_;    ///< of the stage; rest with what is remanent
-  Eigen::VectorXd remanent_;                ///< 2n
-  std::vector<Eigen::VectorXd> centres_;    ///< 2n, of every slip spring
+  Eigen::VectorXd damping_, stiffness_;   ///< of every coordinate; stiffness as pressures make it
+  Eigen::VectorXd input_, force_, rest_;  ///< of the stage; rest with what is remanent
+  Eigen::VectorXd remanent_;              ///< 2n
+  std::vector<Eigen::VectorXd> centres_;  ///< 2n, of every slip spring
   Eigen::VectorXd u_, left_, change_, base_, rates_[kStages], stage_;
   Eigen::MatrixXd slope_;
   Eigen::PartialPivLU<Eigen::MatrixXd> lu_;

@@ -20,7 +20,7 @@ namespace {
 
 constexpr double kLargest_rad = 20.0;     ///< a response beyond it is not that of an arm
 constexpr double kFastest_1ps = 40000.0;  ///< beyond it a simulation takes too long
-constexpr double kStep = 2.0;  ///< times the fastest mode's time constant; stable below 2.78
+constexpr double kStep = 2.0;         ///< times the fastest mode's time constant; stable below 2.78
 constexpr double kSlowStep_s = 0.05;  ///< without inertia: what follows valves and tubes
 
 ArmHypothesis hypothesis(const ArmParameters& arm, const ActuationSettings& actuation) {
@@ -388,8 +388,8 @@ void ResponseModel::simulate_lengths(const ArmHypothesis& arm, Eigen::MatrixXd& 
     for (Eigen::Index i = 0; i < n; ++i) {
       centre[i] = std::clamp(centre[i], target[i] - it.friction_m, target[i] + it.friction_m);
       if (k > 0 && it.remanence.share != 0.0)
-        remanent[i] = it.remanence.step(remanent[i], centre[i],
-                                        record_.time_s[k] - record_.time_s[k - 1]);
+        remanent[i] =
+            it.remanence.step(remanent[i], centre[i], record_.time_s[k] - record_.time_s[k - 1]);
     }
     length_m.row(k) = it.offset_m + centre + remanent;
   }

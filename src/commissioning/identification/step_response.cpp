@@ -117,7 +117,8 @@ MotionRecord record_step_response(const Experiment& experiment, const StepPlan& 
   }
   if (2 * seen < rows)
     throw std::runtime_error("more than half of all frames are lost: see plant.mocap");
-  out.noise_rad = std::sqrt(variance_rad2 / static_cast<double>(std::max<Eigen::Index>(1, seen * n)));
+  out.noise_rad =
+      std::sqrt(variance_rad2 / static_cast<double>(std::max<Eigen::Index>(1, seen * n)));
   out.time_s.conservativeResize(seen);
   out.u_rad.conservativeResize(seen, Eigen::NoChange);
   return out;

@@ -19,6 +19,7 @@ struct Term {
 constexpr Term kOfBend[] = {
     {"filling and venting", &FitChoice::venting},
     {"rest", &FitChoice::rest},
+    {"cross-coupling", &FitChoice::cross},
     {"hysteresis", &FitChoice::hysteresis},
     {"saturation", &FitChoice::saturation},
     {"lags of every chamber", &FitChoice::chamber_lags},
@@ -27,11 +28,10 @@ constexpr Term kOfBend[] = {
     {"delay", &FitChoice::delay},
     {"stiffening", &FitChoice::stiffening},
     {"cubic stiffness", &FitChoice::cubic},
-    {"cross-coupling", &FitChoice::cross},
 };
 constexpr Term kOfElongation[] = {
-    {"saturation", &FitChoice::saturation},       {"lags of every chamber", &FitChoice::chamber_lags},
-    {"friction", &FitChoice::hysteresis},         {"remanence", &FitChoice::remanence},
+    {"saturation", &FitChoice::saturation}, {"lags of every chamber", &FitChoice::chamber_lags},
+    {"friction", &FitChoice::hysteresis},   {"remanence", &FitChoice::remanence},
     {"cross-coupling", &FitChoice::cross},
 };
 constexpr double kNarrowerPriors[] = {0.5, 0.25};
@@ -78,8 +78,8 @@ class Selection {
       out.prior = prior;
       best = std::move(tried);
     };
-    for (const Term& term : plain.elongation ? std::span<const Term>(kOfElongation)
-                                             : std::span<const Term>(kOfBend)) {
+    for (const Term& term :
+         plain.elongation ? std::span<const Term>(kOfElongation) : std::span<const Term>(kOfBend)) {
       if (plain.*term.flag || !applies(term)) continue;
       FitChoice with = out.choice;
       with.*term.flag = true;
@@ -190,8 +190,8 @@ std::string selection_text(const SelectedModel& model, double motion, double uni
     std::string parts;
     for (const double each : trial.unseen_of) parts += fmt::format("{:8.2f}", unit * each);
     text += fmt::format("{:<26}{:>10}{:>10.2f}{:>9.1f}%{}  {}\n", trial.name, trial.parameters,
-                        unit * trial.unseen, 100.0 * (best - trial.unseen) / best,
-                        parts, trial.kept ? "kept" : "left out");
+                        unit * trial.unseen, 100.0 * (best - trial.unseen) / best, parts,
+                        trial.kept ? "kept" : "left out");
     if (trial.kept) best = trial.unseen;
   }
   return text;

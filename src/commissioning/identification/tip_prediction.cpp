@@ -29,10 +29,10 @@ Eigen::MatrixXd chord_bends_rad(const Eigen::MatrixXd& chord_m) {
     for (Eigen::Index i = 0; i < chord_m.cols() / 3; ++i) {
       const Eigen::Vector3d t = chord_m.row(k).segment<3>(3 * i);
       const double across = std::hypot(t.x(), t.y());
-      out.row(k).segment<2>(2 * i) =
-          across > 0.0 ? Eigen::RowVector2d(2.0 * std::atan2(across, t.z()) / across *
-                                            t.head<2>().transpose())
-                       : Eigen::RowVector2d::Zero();
+      out.row(k).segment<2>(2 * i) = across > 0.0
+                                         ? Eigen::RowVector2d(2.0 * std::atan2(across, t.z()) /
+                                                              across * t.head<2>().transpose())
+                                         : Eigen::RowVector2d::Zero();
     }
   return out;
 }

@@ -11,6 +11,7 @@
 
 #include "dev/bench/recordings_score.hpp"
 #include "dev/bench/temporary_folder.hpp"
+#include "softarm/base/output_file.hpp"
 #include "softarm/commissioning/identification/log_record.hpp"
 #include "softarm/commissioning/identification/residual_parts.hpp"
 #include "softarm/commissioning/identification/tip_prediction.hpp"
@@ -118,8 +119,8 @@ class Arena {
       const fs::path log = folder_.path() / "log";
       const MappedTable mapped =
           read_mapped_table(table, options_.config / "recordings" / recording.map);
-      const MarkerFrames frames = marker_frames(read_mapped_table(
-          options_.data / main.table, options_.config / "recordings" / main.map));
+      const MarkerFrames frames = marker_frames(
+          read_mapped_table(options_.data / main.table, options_.config / "recordings" / main.map));
       import_recording(mapped, frames, log);
       out.record = read_log(out.experiment, log, LoggedInput::measured).record;
       out.record.scored_from_s = std::max(out.record.scored_from_s, recording.skip_s);
@@ -145,8 +146,8 @@ class Arena {
     for (const ArenaRecording& each : known)
       if (each.partner_of == main.name)
         if (std::optional<Loaded> other = load(each, main)) others.push_back(std::move(*other));
-    try_choice(*loaded, others, "(16): gains, beta", plain_choice());
-    try_choice(*loaded, others, "(16) + all four", four_terms());
+    const auto simplest = try_choice(*loaded, others, "(16): gains, beta", plain_choice(), {});
+    try_choice(*loaded, others, "(16) + all four", four_terms(), simplest);
     choose(*loaded, others);
   }
 
@@ -163,19 +164,25 @@ class Arena {
     return options;
   }
 
-  /// One fixed choice, without lengths and chords.
-  void try_choice(const Loaded& loaded, const std::vector<Loaded>& others, const std::string& name,
-                  const FitChoice& choice) {
+  /// One fixed choice, without lengths and chords. The search may start from what `simpler` found
+  /// in the same part, and returns what it found in each.
+  std::vector<ArmHypothesis> try_choice(const Loaded& loaded, const std::vector<Loaded>& others,
+                                        const std::string& name, const FitChoice& choice,
+                                        const std::vector<ArmHypothesis>& simpler) {
     const ParameterSet set(configured(loaded.experiment), loaded.experiment.actuation.kind, choice);
-    const IdentifyOptions options = search(loaded.recording.name + ", " + name);
-    const auto find = [&](const MotionRecord& seen) {
-      const auto begin = std::chrono::steady_clock::now();
-      const Refinement fit = identify(set, seen, options);
-      return Found{name, set.size(), since(begin), fit.converged, set.arm(fit.x), {}, {}};
-    };
     const std::vector<Fold> folds = todays_halves(loaded.record);
-    report(loaded, others, find(loaded.record), {find(folds[0].seen[0]), find(folds[1].seen[0])},
-           folds);
+    std::vector<Found> found;
+    std::vector<ArmHypothesis> arms;
+    for (const MotionRecord* seen : {&loaded.record, &folds[0].seen[0], &folds[1].seen[0]}) {
+      IdentifyOptions options = search(loaded.recording.name + ", " + name);
+      if (!simpler.empty()) options.near.push_back(simpler[found.size()]);
+      const auto begin = std::chrono::steady_clock::now();
+      const Refinement fit = identify(set, *seen, options);
+      found.push_back({name, set.size(), since(begin), fit.converged, set.arm(fit.x), {}, {}});
+      arms.push_back(found.back().bend);
+    }
+    report(loaded, others, found[0], {found[1], found[2]}, folds);
+    return arms;
   }
 
   /// As `softarm identify --compare` cuts: the second half is simulated from 10 s before it.
@@ -209,8 +216,10 @@ class Arena {
     length.elongation = true;
     const SelectedModel bend = select("bend", plain_choice());
     const SelectedModel stretch = select("elongation", length);
-    Found whole{"chosen", bend.trials.front().parameters, since(begin), bend.whole.converged,
-                bend.arm, stretch.arm, fit_chords(all)};
+    Found whole{"chosen",       bend.trials.front().parameters,
+                since(begin),   bend.whole.converged,
+                bend.arm,       stretch.arm,
+                fit_chords(all)};
     whole.parameters = bend.whole.x.size() + stretch.whole.x.size();
     std::vector<Found> parts;
     for (std::size_t i = 0; i < folds.size(); ++i) {
@@ -239,8 +248,8 @@ class Arena {
 
   void add(const Loaded& of, const std::string& what, const Found& found,
            const MotionRecord& record) {
-    ArenaRow row{of.recording.name, found.model,   what, found.parameters,
-                 {},                found.seconds, found.converged};
+    ArenaRow row{of.recording.name, found.model,    what, found.parameters, {},
+                 found.seconds,     found.converged};
     const ResponseModel model(record);
     Eigen::MatrixXd u, length(record.time_s.size(), of.experiment.arm.size());
     if (!model.simulate(found.bend, model.step_s(found.bend).value_or(1e-3), u)) {
@@ -259,6 +268,36 @@ class Arena {
                       u.bottomRows(frames), tips_m(record.u_rad, record.chord_m).bottomRows(frames),
                       tip.bottomRows(frames), of.cycles);
     report_.rows.push_back(row);
+    if (!options_.out.empty() && found.chords && what != "whole")
+      write_motion(row, record.time_s.tail(frames), record.u_rad.bottomRows(frames),
+                   u.bottomRows(frames), tips_m(record.u_rad, record.chord_m).bottomRows(frames),
+                   tip.bottomRows(frames));
+  }
+
+  /// Time, then u of all segments and the tip, measured and predicted.
+  void write_motion(const ArenaRow& row, const Eigen::VectorXd& time_s,
+                    const Eigen::MatrixXd& measured_rad, const Eigen::MatrixXd& predicted_rad,
+                    const Eigen::MatrixX3d& measured_m, const Eigen::MatrixX3d& predicted_m) const {
+    fs::create_directories(options_.out);
+    std::string name = row.recording + "_" + row.what + ".csv";
+    std::replace(name.begin(), name.end(), ' ', '_');
+    std::string text = "time_s";
+    for (const char* kind : {"measured", "predicted"}) {
+      for (Eigen::Index c = 0; c < measured_rad.cols(); ++c)
+        text += fmt::format(",{}_u{}_{}_rad", kind, c / 2 + 1, c % 2 == 0 ? "x" : "y");
+      for (const char* axis : {"x", "y", "z"}) text += fmt::format(",{}_tip_{}_m", kind, axis);
+    }
+    for (Eigen::Index k = 0; k < time_s.size(); ++k) {
+      text += fmt::format("\n{:.4f}", time_s[k]);
+      for (const auto* u : {&measured_rad, &predicted_rad}) {
+        for (Eigen::Index c = 0; c < u->cols(); ++c) text += fmt::format(",{:.6g}", (*u)(k, c));
+        const Eigen::MatrixX3d& tip = u == &measured_rad ? measured_m : predicted_m;
+        for (Eigen::Index c = 0; c < 3; ++c) text += fmt::format(",{:.6g}", tip(k, c));
+      }
+    }
+    OutputFile file(options_.out / name, {}, OutputFile::Kind::document);
+    file.write(text + "\n");
+    file.commit();
   }
 
   const ArenaOptions& options_;

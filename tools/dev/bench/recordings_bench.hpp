@@ -63,6 +63,7 @@ struct ArenaOptions {
   std::filesystem::path data;
   std::filesystem::path config;  ///< the folder config of the source tree or installation
   std::string only;              ///< recordings whose name contains this
+  std::filesystem::path out;     ///< for the motions that the chosen model predicts; empty: none
   int threads = 1;
 };
 

@@ -38,11 +38,11 @@ std::string table(const ArenaReport& report) {
                         row.converged ? "" : "  NOT CONVERGED");
   }
   for (const ArenaChoice& choice : report.choices)
-    text += fmt::format("\n{}, bend\n{}\n{}, length\n{}", choice.recording,
-                        selection_text(choice.bend, choice.bend.whole.motion_rms_rad, 1e3, "mrad"),
-                        choice.recording,
-                        selection_text(choice.stretch, choice.stretch.whole.motion_rms_rad, 1e3,
-                                       "mm"));
+    text +=
+        fmt::format("\n{}, bend\n{}\n{}, length\n{}", choice.recording,
+                    selection_text(choice.bend, choice.bend.whole.motion_rms_rad, 1e3, "mrad"),
+                    choice.recording,
+                    selection_text(choice.stretch, choice.stretch.whole.motion_rms_rad, 1e3, "mm"));
   return text;
 }
 

@@ -42,7 +42,8 @@ void score_cycles(const Eigen::VectorXd& time_s, const Eigen::MatrixX3d& measure
   const Eigen::MatrixX3d measured = mean_cycle(time_s, measured_m);
   const Eigen::MatrixX3d predicted = mean_cycle(time_s, predicted_m);
   const double along = predicted.leftCols<2>().cwiseProduct(measured.leftCols<2>()).sum();
-  const double across = predicted.col(0).dot(measured.col(1)) - predicted.col(1).dot(measured.col(0));
+  const double across =
+      predicted.col(0).dot(measured.col(1)) - predicted.col(1).dot(measured.col(0));
   const double norm = std::hypot(along, across);
   Eigen::Matrix2d turn = Eigen::Matrix2d::Identity();
   if (norm > 0.0) turn << along / norm, -across / norm, across / norm, along / norm;

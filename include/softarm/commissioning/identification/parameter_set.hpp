@@ -35,16 +35,17 @@ struct FitChoice {
   bool delay = true;
   bool rest = false;
   bool cubic = false;
-  bool venting = false;       ///< another lag for venting than for filling, the same in all chambers
+  bool venting = false;  ///< another lag for venting than for filling, the same in all chambers
   bool chamber_lags = false;  ///< filling and venting of every chamber
   bool saturation = false;    ///< of every chamber: p counts as p (1 + q p)
   bool hysteresis = false;    ///< slip springs, at radii taken from the motion
   bool remanence = false;     ///< the rest creeps after use: share, time, and where it is at first
   bool stiffening = false;    ///< k (1 + s sum p)
-  bool cross = false;         ///< chambers act on the other segments, too
-  bool mass = false;          ///< one factor on all masses, against the configured ones
-  bool length = false;        ///< one factor on all lengths
-  bool load = false;          ///< a point mass at the tip
+  /// Chambers act on the segments nearer the base, too, which their tendons or tubes pass.
+  bool cross = false;
+  bool mass = false;    ///< one factor on all masses, against the configured ones
+  bool length = false;  ///< one factor on all lengths
+  bool load = false;    ///< a point mass at the tip
   /// How the segments stretch, instead of how they bend: only the elongation is identified.
   bool elongation = false;
 };

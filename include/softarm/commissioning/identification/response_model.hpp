@@ -42,8 +42,8 @@ struct ArmHypothesis {
   std::vector<FillVentLag> lags;
   /// Of every input: p counts as p (1 + saturation p). Negative where it saturates.
   Eigen::VectorXd saturation_1pbar;
-  double stiffening_1pbar = 0.0;         ///< k counts as k (1 + s sum of the segment's pressures)
-  Eigen::MatrixXd cross_nm_per_bar;      ///< 2n x inputs: forces on segments that a chamber is not in
+  double stiffening_1pbar = 0.0;     ///< k counts as k (1 + s sum of the segment's pressures)
+  Eigen::MatrixXd cross_nm_per_bar;  ///< 2n x inputs: forces on segments that a chamber is not in
   std::vector<SlipSpring> slip_springs;  ///< hysteresis, alike in every segment
   Remanence remanence;                   ///< of the rest, alike in every segment
   Eigen::VectorXd remanent_rad;          ///< 2n: its state when the record begins

@@ -26,9 +26,9 @@ std::vector<Fold> folds_of(std::span<const MotionRecord> records);
 /// A term that was tried.
 struct TermTrial {
   std::string name;
-  Eigen::Index parameters = 0;     ///< of the model with it
-  double unseen = 0.0;             ///< RMS over all folds; rad, or m of an elongation
-  std::vector<double> unseen_of;   ///< of every fold
+  Eigen::Index parameters = 0;    ///< of the model with it
+  double unseen = 0.0;            ///< RMS over all folds; rad, or m of an elongation
+  std::vector<double> unseen_of;  ///< of every fold
   bool kept = false;
   double seconds = 0.0;  ///< of the searches
 };
@@ -51,8 +51,8 @@ struct SelectionOptions {
 };
 
 /// Begins with `plain` and adds, in the order of the value that they had on real arms, one term at a
-/// time: asymmetric lag, rest, hysteresis, saturation, lags of every chamber, masses (gravity beside
-/// k), remanence, delay, stiffening, cubic stiffness, cross-coupling. A term stays if the error on
+/// time: asymmetric lag, rest, cross-coupling, hysteresis, saturation, lags of every chamber, masses (gravity beside
+/// k), remanence, delay, stiffening, cubic stiffness. A term stays if the error on
 /// what was not seen becomes less by `least_gain`; then narrower priors are tried in the same way.
 /// @param start  what is configured; every segment gets slip springs at radii taken from the motion
 /// @throws std::runtime_error as `identify`, of the plain model only

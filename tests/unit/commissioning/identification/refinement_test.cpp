@@ -250,9 +250,9 @@ TEST(Refinement, WithoutInertiaAnyDampingIsSimulatedInTheSameSteps) {
     arm.arm.segments[0].damping_nms_per_rad = beta;
     EXPECT_EQ(model.longest_step_s(arm), step_s);
     ASSERT_TRUE(model.simulate(arm, step_s, u));
-    const Eigen::Vector2d balanced =
-        arm.input_map * record.input.value.bottomRows<1>().transpose() /
-        arm.arm.segments[0].stiffness_nm_per_rad;
+    const Eigen::Vector2d balanced = arm.input_map *
+                                     record.input.value.bottomRows<1>().transpose() /
+                                     arm.arm.segments[0].stiffness_nm_per_rad;
     EXPECT_LT((u.bottomRows<1>().transpose() - balanced).norm(), 1e-9) << beta;
   }
 }

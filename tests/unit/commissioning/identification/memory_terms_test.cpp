@@ -1,0 +1,253 @@
+// Arms that lag, remember and carry what nobody entered: responses against closed forms, terms that
+// are chosen because they are there, and misfit that is noticed.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "softarm/commissioning/identification/fit_report.hpp"
+#include "softarm/commissioning/identification/misfit.hpp"
+#include "softarm/commissioning/identification/term_selection.hpp"
+#include "softarm/commissioning/identification/tip_prediction.hpp"
+#include "softarm/config/load.hpp"
+#include "softarm/model/segment.hpp"
+#include "test_folder.hpp"
+#include "unit/commissioning/identification/records.hpp"
+
+namespace softarm {
+namespace {
+
+/// One chamber pair along x, without gravity: frames every 50 ms of a pressure given over time.
+template <class Pressure>
+MotionRecord pressed(double seconds, const Pressure& bar) {
+  MotionRecord out;
+  const auto frames = static_cast<Eigen::Index>(std::lround(seconds / 0.05)) + 1;
+  out.time_s = Eigen::VectorXd::LinSpaced(frames, 0.0, seconds);
+  out.u_rad.setZero(frames, 2);
+  out.input.held = false;
+  out.input.time_s = out.time_s;
+  out.input.value.setZero(frames, 4);
+  for (Eigen::Index k = 0; k < frames; ++k) {
+    const double p = bar(out.time_s[k]);
+    out.input.value(k, p < 0.0 ? 0 : 2) = std::abs(p);
+  }
+  return out;
+}
+
+Experiment weightless() {
+  Experiment experiment = test::one_segment();
+  experiment.arm.gravity_mps2.setZero();
+  experiment.arm.segments[0].stiffness_nm_per_rad = 1.0;
+  return experiment;
+}
+
+TEST(QuasiStatic, SlipSpringMakesThePiecewiseLinearLoop) {
+  // f = k u + stop(u): going up from rest, u = f / (k + w) until r, then (f - w r) / k; back from
+  // the top, first at k + w again over 2 r.
+  ArmHypothesis arm = configured(weightless());
+  arm.inertia = false;
+  arm.arm.segments[0].damping_nms_per_rad = 0.0;
+  const double k = 1.0, w = 0.5, r = 0.1, gain = arm.input_map.col(2).norm(), top_bar = 0.5;
+  arm.slip_springs = {{r, w}};
+  const MotionRecord record = pressed(
+      8.0, [&](double t) { return t < 4.0 ? top_bar * t / 4.0 : top_bar * (2.0 - t / 4.0); });
+  Eigen::MatrixXd u;
+  ASSERT_TRUE(ResponseModel(record).simulate(arm, 0.05, u));
+  const double top = (gain * top_bar - w * r) / k;
+  for (Eigen::Index i = 0; i < u.rows(); ++i) {
+    const double t = record.time_s[i], f = gain * record.input.value(i, 2);
+    const double up = f < (k + w) * r ? f / (k + w) : (f - w * r) / k;
+    const double turned = top - (gain * top_bar - f) / (k + w);
+    const double down = top - turned < 2.0 * r ? turned : (f + w * r) / k;
+    EXPECT_NEAR(u.row(i).norm(), t <= 4.0 ? up : std::abs(down), 1e-9) << t;
+  }
+}
+
+TEST(QuasiStatic, RemanenceIsTheStandardLinearSolid) {
+  // A step of force f: u = f/k at once, and f / (k (1 - share)) in the long run.
+  ArmHypothesis arm = configured(weightless());
+  arm.inertia = false;
+  arm.arm.segments[0].damping_nms_per_rad = 0.0;
+  arm.remanence = {0.3, 2.0};
+  const MotionRecord record = pressed(40.0, [](double t) { return t > 0.01 ? 0.2 : 0.0; });
+  Eigen::MatrixXd u;
+  ASSERT_TRUE(ResponseModel(record).simulate(arm, 0.05, u));
+  const double at_once = 0.2 * arm.input_map.col(2).norm();
+  EXPECT_NEAR(u.row(1).norm(), at_once, 0.02 * at_once);
+  EXPECT_NEAR(u.bottomRows<1>().norm(), at_once / 0.7, 1e-3 * at_once);
+}
+
+TEST(LaggedInput, FillsAndVentsWithTwoTimes) {
+  InputTrack track;
+  track.time_s = Eigen::Vector3d(0.0, 1.0, 3.0);
+  track.value = Eigen::Vector3d(0.0, 1.0, 0.0);
+  LaggedInput lagged(track, {FillVentLag{0.6, 1.5}}, 0.0);
+  Eigen::VectorXd p(1);
+  lagged.at(2.0, p);
+  EXPECT_NEAR(p[0], 1.0 - std::exp(-1.0 / 0.6), 1e-12);
+  lagged.at(3.0, p);
+  const double full = 1.0 - std::exp(-2.0 / 0.6);
+  EXPECT_NEAR(p[0], full, 1e-12);
+  lagged.at(4.0, p);
+  EXPECT_NEAR(p[0], full * std::exp(-1.0 / 1.5), 1e-12);
+}
+
+TEST(TermSelection, KeepsWhatIsThereAndLeavesOutWhatIsNot) {
+  Experiment experiment = weightless();
+  FitChoice plain;
+  plain.stiffness = plain.inertia = plain.lag = plain.delay = false;
+  ArmHypothesis truth = configured(experiment);
+  truth.inertia = false;
+  truth.arm.segments[0].damping_nms_per_rad = 0.05;
+  truth.lags.assign(4, FillVentLag{0.1, 0.8});
+  truth.slip_springs = {{0.05, 0.6}};
+  MotionRecord record = pressed(40.0, [](double t) {
+    return 0.3 * std::sin(1.1 * t) + 0.15 * std::sin(0.37 * t) * std::sin(2.3 * t);
+  });
+  ASSERT_TRUE(ResponseModel(record).simulate(truth, 0.05, record.u_rad));
+  test::add_noise(record, 5e-4, 0.0, 3);
+  SelectionOptions options;
+  options.identify.window_s = 0.5;
+  options.identify.refinement.weighted = false;
+  options.identify.refinement.prior = 1.0;
+  options.identify.refinement.least_gain = 0.05;
+  options.identify.refinement.threads = 2;
+  const std::vector<Fold> folds = halves(record);
+  const SelectedModel found = select_terms(configured(experiment), ActuationKind::chambers, plain,
+                                           std::span(&record, 1), folds, options);
+  EXPECT_TRUE(found.choice.venting || found.choice.chamber_lags);
+  EXPECT_TRUE(found.choice.hysteresis);
+  EXPECT_FALSE(found.choice.cross);
+  EXPECT_LT(found.whole.rms_rad, 3e-3);
+  // Every trial has its price, and the error on what was not seen never grows with what is kept.
+  double best = found.trials.front().unseen;
+  for (const TermTrial& trial : found.trials) {
+    EXPECT_GT(trial.parameters, 0);
+    if (!trial.kept) continue;
+    EXPECT_LE(trial.unseen, best);
+    best = trial.unseen;
+  }
+}
+
+TEST(IdentifiedYaml, HoldsEveryTermAndLoadsAgain) {
+  const TestFolder folder;
+  const auto base = folder.write("base.yaml", R"(
+name: base
+arm: {segments: 2, length_m: 0.1, mass_kg: 0.1, stiffness_nm_per_rad: 1, damping_nms_per_rad: 0.1}
+actuation: {chambers: {angle_rad: [0, 2*pi/3, 4*pi/3], gain_nm_per_bar: 0.3}, max_pressure_bar: 1}
+control: {kp_nm_per_rad: 0}
+reference: [{kind: set_point, theta_rad: 0}]
+)");
+  const Experiment experiment = load_experiment(base);
+  ArmHypothesis arm = configured(experiment);
+  FitChoice choice;
+  choice.directions = true;
+  arm.inertia = false;
+  for (Eigen::Index j = 0; j < 6; ++j)  // all push to one side: no actuation of a controller
+    arm.input_map.col(j) << 0.1 + 0.01 * static_cast<double>(j), 0.02 * static_cast<double>(j);
+  for (int j = 0; j < 6; ++j) arm.lags.push_back({0.1 + 0.1 * j, 0.5 + 0.2 * j});
+  arm.saturation_1pbar = Eigen::VectorXd::LinSpaced(6, -0.5, 0.5);
+  arm.stiffening_1pbar = 0.2;
+  arm.cross_nm_per_bar = Eigen::MatrixXd::Random(4, 6);
+  arm.slip_springs = {{0.01, 0.3}, {0.05, 0.2}};
+  arm.remanence = {0.2, 17.0};
+  arm.remanent_rad = Eigen::Vector4d(0.01, -0.02, 0.03, 0.04);
+  arm.load_kg = 0.05;
+  ElongationHypothesis& stretch = arm.elongation;
+  stretch.offset_m = Eigen::Vector2d(0.11, 0.12);
+  stretch.gain_m_per_bar = Eigen::MatrixXd::Random(2, 6) * 0.02;
+  stretch.lags.assign(6, {0.2, 0.9});
+  stretch.saturation_1pbar = Eigen::VectorXd::LinSpaced(6, 0.1, 0.3);
+  stretch.friction_m = 1e-3;
+  stretch.remanence = {0.1, 40.0};
+
+  const auto file = folder.path() / "found.yaml";
+  folder.write("found.yaml", identified_yaml(experiment, arm, choice, "test", base, file));
+  const ArmHypothesis loaded = configured(load_experiment(file));
+  EXPECT_EQ(loaded.inertia, arm.inertia);
+  EXPECT_LT((loaded.input_map - arm.input_map).norm(), 1e-6);
+  ASSERT_EQ(loaded.lags.size(), 6U);
+  for (std::size_t j = 0; j < 6; ++j) {
+    EXPECT_NEAR(loaded.lags[j].fill_s, arm.lags[j].fill_s, 1e-6);
+    EXPECT_NEAR(loaded.lags[j].vent_s, arm.lags[j].vent_s, 1e-6);
+  }
+  EXPECT_LT((loaded.saturation_1pbar - arm.saturation_1pbar).norm(), 1e-6);
+  EXPECT_NEAR(loaded.stiffening_1pbar, 0.2, 1e-9);
+  EXPECT_LT((loaded.cross_nm_per_bar - arm.cross_nm_per_bar).norm(), 1e-6);
+  ASSERT_EQ(loaded.slip_springs.size(), 2U);
+  EXPECT_NEAR(loaded.slip_springs[1].radius_rad, 0.05, 1e-9);
+  EXPECT_NEAR(loaded.slip_springs[1].stiffness_nm_per_rad, 0.2, 1e-9);
+  EXPECT_NEAR(loaded.remanence.share, 0.2, 1e-9);
+  EXPECT_NEAR(loaded.remanence.time_s, 17.0, 1e-9);
+  EXPECT_LT((loaded.remanent_rad - arm.remanent_rad).norm(), 1e-6);
+  EXPECT_NEAR(loaded.load_kg, 0.05, 1e-9);
+  EXPECT_LT((loaded.elongation.offset_m - stretch.offset_m).norm(), 1e-6);
+  EXPECT_LT((loaded.elongation.gain_m_per_bar - stretch.gain_m_per_bar).norm(), 1e-6);
+  EXPECT_NEAR(loaded.elongation.lags[3].vent_s, 0.9, 1e-9);
+  EXPECT_LT((loaded.elongation.saturation_1pbar - stretch.saturation_1pbar).norm(), 1e-6);
+  EXPECT_NEAR(loaded.elongation.friction_m, 1e-3, 1e-9);
+  EXPECT_NEAR(loaded.elongation.remanence.time_s, 40.0, 1e-9);
+}
+
+TEST(Misfit, ALoadAtTheTipIsNoticedAndNamed) {
+  Experiment experiment = test::one_segment();
+  experiment.plant.payload_kg = {0.05};
+  MotionRecord record = test::plant_record(experiment, 4, 0.2, 0.5, 100.0);
+  test::add_noise(record, 1e-3, 0.0, 5);
+  record.noise_rad = 1e-3;
+  FitChoice choice;
+  choice.gains = GainSharing::arm;
+  choice.lag = choice.delay = false;
+  const ArmHypothesis start = configured(experiment);
+  const ParameterSet set(start, ActuationKind::chambers, choice);
+  RefinementOptions options;
+  options.threads = 2;
+  Refinement fit = refine(set, record, set.configured(), options);
+  const double truth = experiment.arm.segments[0].stiffness_nm_per_rad / set[0].scale;
+  const Misfit misfit =
+      judge_misfit(start, ActuationKind::chambers, choice, std::span(&record, 1), fit, options);
+  ASSERT_TRUE(misfit.significant);
+  ASSERT_FALSE(misfit.causes.empty());
+  EXPECT_GT(std::abs(fit.x[0] - truth), fit.half_width(0)) << "noise alone does not explain it";
+  widen(misfit, fit);
+  EXPECT_LT(std::abs(fit.x[0] - truth), fit.half_width(0));
+  const auto load =
+      std::find_if(misfit.causes.begin(), misfit.causes.end(),
+                   [](const MisfitCause& it) { return it.name == "load at the tip"; });
+  ASSERT_NE(load, misfit.causes.end());
+  EXPECT_NEAR(load->value, 0.05, 0.002);
+  EXPECT_LT(load->rms_rad, 1.05e-3);
+  EXPECT_NE(misfit_text(misfit).find("load at the tip"), std::string::npos);
+
+  // Nothing is wrong with an arm that is as modelled.
+  experiment.plant.payload_kg = {0.0};
+  record = test::plant_record(experiment, 4, 0.2, 0.5, 100.0);
+  test::add_noise(record, 1e-3, 0.0, 5);
+  record.noise_rad = 1e-3;
+  fit = refine(set, record, set.configured(), options);
+  EXPECT_FALSE(
+      judge_misfit(start, ActuationKind::chambers, choice, std::span(&record, 1), fit, options)
+          .significant);
+}
+
+TEST(TipPrediction, ChordsOfConstantCurvatureGiveTheTip) {
+  MotionRecord record;
+  record.time_s = Eigen::VectorXd::LinSpaced(50, 0.0, 5.0);
+  record.u_rad = 0.5 * Eigen::MatrixXd::Random(50, 4);
+  record.chord_m.resize(50, 6);
+  const double lengths[2] = {0.11, 0.14};
+  for (Eigen::Index k = 0; k < 50; ++k)
+    for (Eigen::Index i = 0; i < 2; ++i)
+      record.chord_m.row(k).segment<3>(3 * i) =
+          segment_tip(lengths[i], record.u_rad.row(k).segment<2>(2 * i).transpose());
+  EXPECT_LT((chord_bends_rad(record.chord_m) - record.u_rad).cwiseAbs().maxCoeff(), 1e-12);
+  const Eigen::MatrixXd found = chord_lengths_m(record);
+  EXPECT_LT((found.col(0).array() - lengths[0]).abs().maxCoeff(), 1e-12);
+  EXPECT_LT((found.col(1).array() - lengths[1]).abs().maxCoeff(), 1e-12);
+  const ChordMap map = fit_chords(std::span(&record, 1));
+  EXPECT_LT((map.of_bend - ChordMap::identity(2).of_bend).cwiseAbs().maxCoeff(), 1e-9);
+  EXPECT_LT((chords_m(map.bend_rad(record.u_rad), found) - record.chord_m).cwiseAbs().maxCoeff(),
+            1e-9);
+}
+
+}  // namespace
+}  // namespace softarm
