@@ -1,7 +1,8 @@
 """Costs of the Python package beside C++ and SoRoMoX; started by `softarm-dev bench python`.
 
 usage: python_bench.py CONFIG SECONDS JSON_OF_C++_TIMES [PYTHON_WITH_SOROMOX]
-Every round times each side for some milliseconds, so that what else the machine does meets all of them; medians.
+Every round times each side for some milliseconds, so that what else the machine does meets all of them; medians of
+processor time, but for the simulated arms on one and two threads, whose time is the clock's: measure those on a quiet machine.
 """
 
 import json
@@ -19,7 +20,7 @@ PLANTS = 16
 
 
 class Soromox:
-    """The same arm there, in a Python of its own: the spatial PCS model with bending alone."""
+    """The same arm there, in a separate Python: the spatial PCS model with bending alone."""
 
     def __init__(self, python):
         self._worker = subprocess.Popen(
@@ -52,7 +53,7 @@ def serve_soromox():
     from soromox.systems.pcs.structures import PCSStructure
 
     # Curvature = theta / L, about Y and Z with X along the arm; a radius of which the rotary inertia is nothing.
-    radius = 1e-3
+    radius = 1e-4
     stiffness, damping = np.eye(6), np.zeros((6, 6))
     for axis in (1, 2):
         stiffness[axis, axis], damping[axis, axis] = STIFFNESS * LENGTH_M**2, DAMPING * LENGTH_M**2
@@ -82,19 +83,19 @@ def serve_soromox():
     for line in sys.stdin:
         u, velocity, calls = json.loads(line)
         state = jnp.concatenate([jnp.asarray(curvature(np.array(u))), jnp.asarray(curvature(np.array(velocity)))])
-        begin = time.perf_counter()
+        begin = time.process_time()
         for _ in range(calls):
             out = forward(state).block_until_ready()
-        us = 1e6 * (time.perf_counter() - begin) / calls
+        us = 1e6 * (time.process_time() - begin) / calls
         bent = np.asarray(out)[2 * SEGMENTS :] * LENGTH_M
         print(json.dumps({"acceleration": np.column_stack([bent[1::2], -bent[::2]]).ravel().tolist(), "us": us}), flush=True)
 
 
-def timed_us(call, calls):
-    begin = time.perf_counter()
+def timed_us(call, calls, clock=time.process_time):
+    begin = clock()
     for _ in range(calls):
         call()
-    return 1e6 * (time.perf_counter() - begin) / calls
+    return 1e6 * (clock() - begin) / calls
 
 
 def tick_us(softarm, experiment, ticks):
@@ -105,9 +106,9 @@ def tick_us(softarm, experiment, ticks):
         now_ns = k * pipeline.period_ns
         arm.advance_to(now_ns)
         frames, measured = arm.receive(), arm.plant.pressure_bar.astype(np.float32)
-        begin = time.perf_counter()
+        begin = time.process_time_ns()
         tick = pipeline.tick(now_ns, frames, measured_bar=measured, go=True)
-        times.append(1e6 * (time.perf_counter() - begin))
+        times.append(1e-3 * (time.process_time_ns() - begin))
         arm.command(tick.pressure_bar, 0.1, now_ns)
     assert tick.mode == "ACTIVE", tick.mode
     return statistics.median(times)
@@ -144,7 +145,7 @@ def measure(config, seconds, cpp, soromox_python):
         if soromox:
             rows["soromox"].append(soromox.ask(u, velocity, 50)[1])
         for name, threads in (("one thread", 1), ("two threads", 2)):
-            rows[name].append(timed_us(lambda: softarm.advance(plants, 0.02, commands, threads=threads), 1))
+            rows[name].append(timed_us(lambda: softarm.advance(plants, 0.02, commands, threads=threads), 1, time.perf_counter))
     if soromox:
         soromox.close()
 
