@@ -15,6 +15,8 @@ except ImportError:
 
 TOOLS = pathlib.Path(__file__).resolve().parents[2] / "tools"
 sys.path.insert(0, str(TOOLS))
+import numpy as np  # noqa: E402
+from plotting import player, report  # noqa: E402
 from plotting.run_log import RunLog, ShapeLog  # noqa: E402
 
 PERIOD_S = 0.02
@@ -86,6 +88,47 @@ class PlotRun(unittest.TestCase):
         page = (self.directory / "report.html").read_text(encoding="utf-8")
         self.assertEqual(page.count("data:image/png;base64,"), len(pictures))
         self.assertIn("small_test", page)
+
+    def test_the_report_says_why_the_arm_was_not_active(self):
+        write_log(self.directory, 1)
+        self.assertEqual(report.why_not_active(RunLog(self.directory)), [], "waiting at the start is as it should be")
+        log = self.directory / "log.csv"
+        text = log.read_text(encoding="utf-8")
+        log.write_text(text.replace("ACTIVE,none", "VENT,frames_missing"), encoding="utf-8")
+        never = report.why_not_active(RunLog(self.directory))
+        self.assertEqual(never[0], "The arm never became ACTIVE.")
+        self.assertIn("VENT: frames missing, from 0.50 s", never[2])
+        lines = [line.replace("ACTIVE,none", "HOLD,frames_late") if line.startswith(("2.5", "2.6")) else line
+                 for line in text.splitlines()]
+        log.write_text("\n".join(lines), encoding="utf-8")
+        held = report.why_not_active(RunLog(self.directory))
+        self.assertRegex(held[0], "not ACTIVE for 0.2. s")
+        self.assertEqual(len(held), 2)
+        self.assertIn("HOLD: frames late, from 2.50 s", held[1])
+        self.assertEqual(run(self.directory, "--quiet").returncode, 0)
+        self.assertIn("HOLD: frames late", (self.directory / "report.html").read_text(encoding="utf-8"))
+
+    def test_the_player_s_arm_is_the_arm(self):
+        """Arcs against a chain of straight pieces, and what the page gets."""
+        u, lengths, pieces = np.array([[[0.6, -0.3], [1e-9, 0.0], [0.2, 1.1]]]), [0.1, 0.12, 0.08], 4000
+        frame = np.eye(4)
+        for (ux, uy), length in zip(u[0], lengths):
+            x, y = -uy / pieces, ux / pieces
+            cross = np.array([[0, 0, y], [0, 0, -x], [-y, x, 0]])
+            step = np.eye(4)
+            step[:3, :3] += cross + 0.5 * cross @ cross
+            step[:3, 3] = [0.5 * length / pieces * ux / pieces, 0.5 * length / pieces * uy / pieces, length / pieces]
+            frame = frame @ np.linalg.matrix_power(step, pieces)
+        np.testing.assert_allclose(player.arcs(u, lengths)[0, -1], frame[:3, 3], atol=1e-7)
+        write_log(self.directory, 2)
+        self.assertIsNone(player.scene(RunLog(self.directory)), "without lengths there is no arm")
+        arm = {"length_m": [0.1, 0.1], "base_rotation": np.eye(3).tolist(), "base_position_m": [0, 0, 1]}
+        (self.directory / "summary.json").write_text(json.dumps({"arm": arm}), encoding="utf-8")
+        scene = player.scene(RunLog(self.directory))
+        self.assertEqual([line["name"] for line in scene["lines"]], ["reference", "true arm", "estimate"])
+        self.assertEqual(max(scene["tipError"], key=lambda e: e or 0), 0.0)
+        self.assertEqual(run(self.directory, "--quiet").returncode, 0)
+        self.assertIn('<canvas id="arm"', (self.directory / "report.html").read_text(encoding="utf-8"))
 
     def test_links_and_a_path_of_the_tip_give_figures_4_to_7(self):
         write_log(self.directory, 2)

@@ -1,7 +1,8 @@
 """Costs of the Python package beside C++ and SoRoMoX; started by `softarm-dev bench python`.
 
 usage: python_bench.py CONFIG SECONDS JSON_OF_C++_TIMES [PYTHON_WITH_SOROMOX]
-Every round times each side for some milliseconds, so that what else the machine does meets all of them; medians.
+Every round times each side for some milliseconds, so that what else the machine does meets all of them; medians of
+processor time, but for the simulated arms on one and two threads, whose time is the clock's: measure those on a quiet machine.
 """
 
 import json
@@ -19,7 +20,7 @@ PLANTS = 16
 
 
 class Soromox:
-    """The same arm there, in a Python of its own: the spatial PCS model with bending alone."""
+    """The same arm there, in a separate Python: the spatial PCS model with bending alone."""
 
     def __init__(self, python):
         self._worker = subprocess.Popen(
@@ -28,10 +29,10 @@ class Soromox:
         self.version = self._worker.stdout.readline().strip()
 
     def ask(self, u, velocity, calls):
-        """u'' and the time of a call in us."""
+        """u'', and the processor time of a call in us, of all threads, and the clock's."""
         self._worker.stdin.write(json.dumps([u.tolist(), velocity.tolist(), calls]) + "\n")
         answer = json.loads(self._worker.stdout.readline())
-        return np.array(answer["acceleration"]), answer["us"]
+        return np.array(answer["acceleration"]), answer["us"], answer["wall_us"]
 
     def close(self):
         self._worker.stdin.close()
@@ -52,7 +53,7 @@ def serve_soromox():
     from soromox.systems.pcs.structures import PCSStructure
 
     # Curvature = theta / L, about Y and Z with X along the arm; a radius of which the rotary inertia is nothing.
-    radius = 1e-3
+    radius = 1e-4
     stiffness, damping = np.eye(6), np.zeros((6, 6))
     for axis in (1, 2):
         stiffness[axis, axis], damping[axis, axis] = STIFFNESS * LENGTH_M**2, DAMPING * LENGTH_M**2
@@ -82,19 +83,19 @@ def serve_soromox():
     for line in sys.stdin:
         u, velocity, calls = json.loads(line)
         state = jnp.concatenate([jnp.asarray(curvature(np.array(u))), jnp.asarray(curvature(np.array(velocity)))])
-        begin = time.perf_counter()
+        begin, wall = time.process_time(), time.perf_counter()
         for _ in range(calls):
             out = forward(state).block_until_ready()
-        us = 1e6 * (time.perf_counter() - begin) / calls
+        us, wall_us = 1e6 * (time.process_time() - begin) / calls, 1e6 * (time.perf_counter() - wall) / calls
         bent = np.asarray(out)[2 * SEGMENTS :] * LENGTH_M
-        print(json.dumps({"acceleration": np.column_stack([bent[1::2], -bent[::2]]).ravel().tolist(), "us": us}), flush=True)
+        print(json.dumps({"acceleration": np.column_stack([bent[1::2], -bent[::2]]).ravel().tolist(), "us": us, "wall_us": wall_us}), flush=True)
 
 
-def timed_us(call, calls):
-    begin = time.perf_counter()
+def timed_us(call, calls, clock=time.process_time):
+    begin = clock()
     for _ in range(calls):
         call()
-    return 1e6 * (time.perf_counter() - begin) / calls
+    return 1e6 * (clock() - begin) / calls
 
 
 def tick_us(softarm, experiment, ticks):
@@ -105,9 +106,9 @@ def tick_us(softarm, experiment, ticks):
         now_ns = k * pipeline.period_ns
         arm.advance_to(now_ns)
         frames, measured = arm.receive(), arm.plant.pressure_bar.astype(np.float32)
-        begin = time.perf_counter()
+        begin = time.process_time_ns()
         tick = pipeline.tick(now_ns, frames, measured_bar=measured, go=True)
-        times.append(1e6 * (time.perf_counter() - begin))
+        times.append(1e-3 * (time.process_time_ns() - begin))
         arm.command(tick.pressure_bar, 0.1, now_ns)
     assert tick.mode == "ACTIVE", tick.mode
     return statistics.median(times)
@@ -129,10 +130,11 @@ def measure(config, seconds, cpp, soromox_python):
     plants = [softarm.Plant(experiment) for _ in range(PLANTS)]
     commands = random.uniform(0.0, 0.5, (PLANTS, experiment.chambers[0] * experiment.segments))
     soromox = Soromox(soromox_python) if soromox_python else None
-    rows = {name: [] for name in ("controller", "forward", "derivatives", "soromox", "one thread", "two threads")}
+    names = "controller", "forward", "derivatives", "soromox", "soromox wall", "forward wall", "one thread", "two threads"
+    rows = {name: [] for name in names}
     report = {}
     if soromox:
-        theirs, _ = soromox.ask(u, velocity, 1)
+        theirs, *_ = soromox.ask(u, velocity, 1)
         ours = arm.forward_dynamics(u, velocity, force)
         report["soromox"] = soromox.version
         report["difference"] = float(np.abs(theirs - ours).max() / np.abs(ours).max())
@@ -142,9 +144,12 @@ def measure(config, seconds, cpp, soromox_python):
         rows["forward"].append(timed_us(lambda: arm.forward_dynamics(u, velocity, force), 500))
         rows["derivatives"].append(timed_us(lambda: arm.forward_dynamics_derivatives(u, velocity, force), 200))
         if soromox:
-            rows["soromox"].append(soromox.ask(u, velocity, 50)[1])
+            _, processor_us, wall_us = soromox.ask(u, velocity, 50)
+            rows["soromox"].append(processor_us)
+            rows["soromox wall"].append(wall_us)
+            rows["forward wall"].append(timed_us(lambda: arm.forward_dynamics(u, velocity, force), 500, time.perf_counter))
         for name, threads in (("one thread", 1), ("two threads", 2)):
-            rows[name].append(timed_us(lambda: softarm.advance(plants, 0.02, commands, threads=threads), 1))
+            rows[name].append(timed_us(lambda: softarm.advance(plants, 0.2, commands, threads=threads), 1, time.perf_counter))
     if soromox:
         soromox.close()
 
@@ -165,6 +170,7 @@ def measure(config, seconds, cpp, soromox_python):
     if soromox:
         report["soromox_us"] = statistics.median(rows["soromox"])
         report["soromox_over_forward"] = median_ratio("soromox", "forward")
+        report["soromox_over_forward_best_wall"] = min(rows["soromox wall"]) / min(rows["forward wall"])
     return report
 
 
@@ -179,7 +185,8 @@ def table(r):
         lines.append(f"{text:36}{r[name + '_us']:11.2f}{r[name + '_cpp_us']:11.2f}")
     if "soromox" in r:
         lines.append(
-            f"forward dynamics of {r['soromox']}: {r['soromox_us']:.1f} us, {r['soromox_over_forward']:.0f} times ours;"
+            f"forward dynamics of {r['soromox']}: {r['soromox_us']:.1f} us, {r['soromox_over_forward']:.0f} times ours"
+            f" ({r['soromox_over_forward_best_wall']:.0f} times by the clock, each side's best round);"
             f" the same arm to {r['difference']:.1e}"
         )
     lines.append(f"{PLANTS} simulated arms, two threads over one: {r['two_threads_over_one']:.2f}")
