@@ -33,6 +33,7 @@ void count(const Method& method, int segments) {
 
 int main() {
   using softarm::Method, softarm::Route, softarm::MassModel;
+  CALLGRIND_START_INSTRUMENTATION;
   for (const MassModel mass : {MassModel::point, MassModel::distributed}) {
     for (const int segments : {3, 10}) {
       for (const bool polar : {false, true}) {

@@ -121,6 +121,8 @@ TEST(Untimely, IsWhatWasNotSentNow) {
   EXPECT_TRUE(is_untimely(INT64_MAX, kValidity, kNow));
   EXPECT_FALSE(is_untimely(0, kValidity, kNow)) << "unknown";
   EXPECT_FALSE(is_untimely(1'700'000'000'000'000, kValidity, kNow)) << "the wall clock";
+  EXPECT_FALSE(is_untimely(1'000'000'000'000'001, kValidity, kNow)) << "the wall clock";
+  EXPECT_TRUE(is_untimely(1'000'000'000'000'000, kValidity, kNow)) << "not yet";
 }
 
 TEST_F(Expiry, ShadowCommandsNeverReachTheValves) {
@@ -173,7 +175,17 @@ TEST(LongestValidity, CutsWhatASenderAsksFor) {
       << "others are heard again";
 }
 
-TEST_F(Expiry, NegativeCountsAreRefused) { EXPECT_THROW(CommandExpiry(-1), std::invalid_argument); }
+TEST_F(Expiry, NegativeCountsAreRefused) {
+  EXPECT_THROW(CommandExpiry(-1), std::invalid_argument);
+  EXPECT_NO_THROW(CommandExpiry(0));
+}
+
+TEST_F(Expiry, TheSendersClockMayBeCoarse) {
+  PressureCommand first = command(1), next = command(2);
+  first.sent_us = next.sent_us = 5'000;
+  EXPECT_EQ(expiry.receive(first, 0), CommandVerdict::in_force);
+  EXPECT_EQ(expiry.receive(next, 1 * kMs), CommandVerdict::in_force);
+}
 
 }  // namespace
 }  // namespace softarm

@@ -384,6 +384,85 @@ TEST_F(Guard, ASecondSenderVentsUntilOneHasLeftAndCommandsHaveBeenZero) {
   EXPECT_TRUE(reach(ValveState::running));
 }
 
+TEST_F(Guard, AFloodOfAnotherSenderDoesNotHideThatTheTerminalIsReady) {
+  commanding = true;
+  const auto flood = [&] {
+    const std::array<double, 2> theirs{2.0, 2.0};
+    for (int k = 0; k < 50; ++k)
+      guard->command(
+          {.sequence = sequence + 1'000'000 + k, .validity_ns = 100 * kMs, .pressure_bar = theirs},
+          now);
+  };
+  for (int k = 0; k < 20; ++k) {
+    cycle();
+    flood();
+    ASSERT_TRUE(written.isZero()) << k;
+  }
+  EXPECT_EQ(guard->state(), ValveState::degraded);
+  EXPECT_EQ(guard->reason(), ValveReason::other_sender);
+  EXPECT_EQ(guard->counters().times_degraded, 1);
+  wanted = {0.0, 0.0};
+  EXPECT_TRUE(reach(ValveState::running, 150));
+}
+
+TEST_F(Guard, AnotherSenderDoesNotExcuseAStuckValve) {
+  run();
+  stuck_at = 2.0;
+  ASSERT_TRUE(reach(ValveState::degraded));
+  ASSERT_EQ(guard->reason(), ValveReason::stuck_valve);
+  const std::array<double, 2> theirs{2.0, 2.0};
+  command(0.5, 1.0);
+  guard->command(
+      {.sequence = sequence + 1'000'000, .validity_ns = 100 * kMs, .pressure_bar = theirs}, now);
+  command(0.5, 1.0);
+  EXPECT_GT(guard->counters().other_senders, 0);
+  EXPECT_EQ(guard->reason(), ValveReason::stuck_valve);
+}
+
+TEST_F(Guard, AnEmergencyStopVentsUntilItIsAcknowledgedWhateverElseHappens) {
+  run();
+  guard->emergency_stop();
+  EXPECT_EQ(guard->state(), ValveState::degraded);
+  EXPECT_EQ(guard->reason(), ValveReason::emergency_stop);
+  EXPECT_TRUE(guard->set_points_bar().isZero()) << "at once";
+  for (int k = 0; k < 500; ++k) {
+    read_back.diagnosis[0] = k % 100 == 50;  // another fault that comes and goes
+    cycle();
+    ASSERT_TRUE(written.isZero()) << k;
+    ASSERT_EQ(guard->reason(), ValveReason::emergency_stop);
+    ASSERT_EQ(guard->chamber(), -1);
+  }
+  guard->acknowledge();
+  ASSERT_TRUE(reach(ValveState::vented));
+  for (int k = 0; k < 100; ++k) cycle();
+  EXPECT_EQ(guard->reason(), ValveReason::waiting_for_zero) << "with automatic arming too";
+  wanted = {0.0, 0.0};
+  cycle();
+  wanted = {0.5, 1.0};
+  EXPECT_TRUE(reach(ValveState::running));
+}
+
+TEST_F(Guard, AnEmergencyStopBeforeTheConnectionOrWithoutCommandsIsKept) {
+  for (const ValveState state :
+       {ValveState::disconnected, ValveState::securing, ValveState::starting, ValveState::vented}) {
+    make();
+    commanding = false;
+    ASSERT_TRUE(reach(state));
+    guard->emergency_stop();
+    commanding = true;
+    ASSERT_TRUE(reach(ValveState::degraded)) << name(state);
+    EXPECT_EQ(guard->reason(), ValveReason::emergency_stop);
+    reachable = false;  // the connection is lost and comes back
+    cycle(LinkResult::broken);
+    ASSERT_EQ(guard->state(), ValveState::disconnected);
+    reachable = true;
+    ASSERT_TRUE(reach(ValveState::degraded));
+    for (int k = 0; k < 200; ++k) cycle();
+    EXPECT_EQ(guard->state(), ValveState::degraded);
+    EXPECT_EQ(guard->reason(), ValveReason::emergency_stop);
+  }
+}
+
 TEST_F(Guard, WithExplicitArmingPressureDoesNotReturnByItselfAfterAnExpiry) {
   settings.wait_for_zero = true;
   make();
@@ -540,6 +619,87 @@ TEST_F(Guard, AGapInTimeDegrades) {
   EXPECT_EQ(guard->reason(), ValveReason::time_gap);
   cycle();
   EXPECT_TRUE(written.isZero());
+  EXPECT_TRUE(reach(ValveState::running));
+  EXPECT_EQ(guard->counters().times_degraded, 1);
+}
+
+// Five periods, but not less than 50 ms, nor more than the terminal's time-out.
+TEST_F(Guard, AGapBeginsBeyondItsThreshold) {
+  struct Row {
+    double rate_hz, failsafe_s;
+    std::int64_t longest_ns;
+  };
+  for (const Row& row :
+       {Row{200.0, 0.2, 50 * kMs}, {20.0, 0.4, 250 * kMs}, {20.0, 0.2, 199 * kMs}}) {
+    settings.driver.rate_hz = row.rate_hz;
+    settings.driver.failsafe_timeout_s = row.failsafe_s;
+    for (const bool beyond : {false, true}) {
+      make();
+      run();
+      now += row.longest_ns + (beyond ? 1 * kMs : 0);
+      // Beyond the time-out of 0.2 s nothing has been answered for too long as well.
+      EXPECT_EQ(guard->wake(now), !beyond) << row.rate_hz << " Hz, " << row.failsafe_s << " s";
+    }
+  }
+}
+
+// It was our silence, in which the terminal has vented, and not pressure that does not fall.
+TEST_F(Guard, AfterASleepAsLongAsTheTerminalsTimeOutPressureHasItAgainToFall) {
+  settings.driver.failsafe_timeout_s = 0.2;
+  make();
+  run();
+  now += 200 * kMs;
+  EXPECT_FALSE(guard->wake(now));
+  EXPECT_EQ(guard->next(now), ValveAction::exchange);
+  EXPECT_EQ(guard->state(), ValveState::degraded);
+}
+
+TEST_F(Guard, WithoutAConnectionCommandsAreHeardAllTheSame) {
+  run();
+  reachable = false;
+  cycle(LinkResult::broken);
+  for (int k = 0; k < 100; ++k) {
+    now += kPeriod;
+    ASSERT_TRUE(guard->wake(now)) << k;
+    guard->next(now);
+  }
+}
+
+TEST_F(Guard, SilenceOfTheCommanderIsAsGoodAsZeroAfterDegraded) {
+  for (const bool waits : {false, true}) {
+    settings.wait_for_zero = waits;
+    make();
+    commanding = true;
+    wanted = {0.0, 0.0};
+    ASSERT_TRUE(reach(ValveState::running));
+    wanted = {0.5, 1.0};
+    command(0.5, 1.0);
+    const std::array<double, 2> theirs{2.0, 2.0};
+    guard->command(
+        {.sequence = sequence + 1'000'000, .validity_ns = 100 * kMs, .pressure_bar = theirs}, now);
+    cycle();
+    ASSERT_EQ(guard->state(), ValveState::degraded);
+    commanding = false;
+    for (int k = 0; k < 200; ++k) cycle();
+    ASSERT_EQ(guard->state(), ValveState::vented);
+    commanding = true;
+    cycle();
+    EXPECT_EQ(guard->state(), ValveState::running);
+  }
+}
+
+TEST_F(Guard, AConnectionThatIsLostWhileVentedNeedsNoZero) {
+  settings.wait_for_zero = true;
+  make();
+  commanding = true;
+  wanted = {0.0, 0.0};
+  ASSERT_TRUE(reach(ValveState::running));
+  commanding = false;
+  ASSERT_TRUE(reach(ValveState::vented));
+  cycle(LinkResult::broken);
+  ASSERT_EQ(guard->state(), ValveState::disconnected);
+  wanted = {0.5, 1.0};
+  commanding = true;
   EXPECT_TRUE(reach(ValveState::running));
 }
 
