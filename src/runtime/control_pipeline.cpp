@@ -296,8 +296,7 @@ void ControlPipeline::use_frame(bool too_many) noexcept {
   if (expects) expect(frame.capture_ns);
   const KnownMotion* const expected = expects ? &known_ : nullptr;
   filter_.update(frame.capture_ns, estimate, expected);
-  length_watch_.judge(frame.capture_ns, estimate,
-                      expects && elongation_ ? &known_.u_rad : nullptr);
+  length_watch_.judge(frame.capture_ns, estimate, expects && elongation_ ? &known_.u_rad : nullptr);
   if (!observer_) return;
   if (too_many) {
     newest_frames_.keep(frame, estimate, expected);

@@ -1,6 +1,6 @@
 #include "softarm/simulation/chamber_hysteresis.hpp"
 
-#include "softarm/actuation/play.hpp"
+#include "softarm/model/memory.hpp"
 
 namespace softarm {
 

@@ -5,7 +5,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "softarm/actuation/play.hpp"
+#include "softarm/model/memory.hpp"
 
 namespace softarm {
 namespace {

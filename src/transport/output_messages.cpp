@@ -174,7 +174,7 @@ bool OutputMessages::set_observer(std::int64_t tick, const ControlPipeline& pipe
       load[i][0] = static_cast<float>(from.segment[i].load.x());
       load[i][1] = static_cast<float>(from.segment[i].load.y());
     }
-    put_pairs(from.disturbance_nm, disturbance_nm);
+    put_pairs(from.disturbance_nm, 2, disturbance_nm);
   };
   put(report_.correction, observer.stiffness, observer.damping, observer.gain, observer.load,
       observer.disturbance_nm);

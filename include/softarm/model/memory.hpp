@@ -4,9 +4,17 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <cmath>
 
 namespace softarm {
+
+/// The play operator of one direction, backlash: `output` stays where it is until `input` leaves
+/// output +- half_width, and then follows at that distance. Along a monotone input its result
+/// depends on the last value alone. Weighted sums of it are the Prandtl-Ishlinskii model.
+inline double play(double output, double input, double half_width) noexcept {
+  return std::clamp(output, input - half_width, input + half_width);
+}
 
 /// The play operator of a vector: its centre is dragged by u at a distance of at most `radius`.
 /// Independent of rate and of the directions of the axes; for one direction, the scalar play

@@ -9,13 +9,13 @@
 namespace softarm {
 namespace {
 
-Experiment shipped(const std::string& name) {
+Experiment configured(const std::string& name) {
   return load_experiment(std::filesystem::path(SOFTARM_SOURCE_DIR) / "config" / name);
 }
 
 void holds(const RobustnessScene& scene, int seeds) {
   const Experiment experiment =
-      robustness_experiment(scene, RobustnessLaw::observer_parameters, shipped);
+      robustness_experiment(scene, RobustnessLaw::observer_parameters, configured);
   for (int seed = 1; seed <= seeds; ++seed) {
     const RobustnessTrial trial = run(experiment, scene, static_cast<std::uint64_t>(seed));
     EXPECT_TRUE(trial.stayed_active) << scene.name << ", seed " << seed;

@@ -264,8 +264,8 @@ TEST_F(ValvesBehindARelay, AnEmergencyStopVentsWithoutADaemonUntilItIsAcknowledg
   begin();
   ASSERT_TRUE(run_at(0.3)) << driver_->printed();
   const auto request = [&](std::int8_t kind) {
-    node_->publish("SOFTARM_OPERATOR",
-                   softarm_messages::operator_command_t{.sequence = 1, .nonce = 0, .request = kind});
+    node_->publish("SOFTARM_OPERATOR", softarm_messages::operator_command_t{
+                                           .sequence = 1, .nonce = 0, .request = kind});
   };
   using Request = softarm_messages::operator_command_t;
   ASSERT_TRUE(command_until(0.3, [&] {

@@ -14,7 +14,9 @@ TEST(Play, DragsItsCentreAtTheRadiusAndNoFarther) {
     const Eigen::Vector2d before = centre;
     centre = play(centre, u, 0.2);
     EXPECT_LE((u - centre).norm(), 0.2 + 1e-15);
-    if ((u - before).norm() <= 0.2) EXPECT_EQ(centre, before);
+    if ((u - before).norm() <= 0.2) {
+      EXPECT_EQ(centre, before);
+    }
   }
 }
 

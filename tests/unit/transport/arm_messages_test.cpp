@@ -74,7 +74,9 @@ TEST(ArmMessages, ElongationsComeWhereSegmentsStretchAndOnlyOfAllSegments) {
   EXPECT_EQ(status.reference_elongation_m[0], 0.75);
   EXPECT_EQ(status.axial_force_n[1], 32.0);
   EXPECT_EQ(status.pressure_bar[11], 802.75);
-  for (const std::int16_t wrong : {1, 2, 4}) EXPECT_FALSE(decode(stretching(wrong), status));
+  for (const int wrong : {1, 2, 4}) {
+    EXPECT_FALSE(decode(stretching(static_cast<std::int16_t>(wrong)), status));
+  }
 
   auto truth = example<plant_state_t>(2, 4);
   PlantState state;

@@ -44,7 +44,7 @@ Eigen::Isometry3f turned(float angle_rad) {
   return pose;
 }
 
-BodyNames base_and_tip() {
+BodyNames base_then_tip() {
   BodySettings bodies{.base_id = 0, .segment_ids = {1}};
   bodies.base_marker_frame.name = "base & <frame>";
   bodies.segment_marker_frames = {{.name = "tip"}};
@@ -91,7 +91,7 @@ TEST(QtmPackets, ABodyNotSeenAndAMatrixThatIsNoRotation) {
 }
 
 TEST(QtmPackets, NamesBecomePlacesInTheList) {
-  BodyNames names = base_and_tip();
+  BodyNames names = base_then_tip();
   read_qtm_names(kXml, names);
   EXPECT_EQ(names.bodies()[0].sent_id, 3);
   EXPECT_EQ(names.bodies()[1].sent_id, 2);
@@ -106,8 +106,8 @@ TEST(QtmPackets, NamesBecomePlacesInTheList) {
 
 TEST(QtmPackets, ASimulatedServerIsUnderstood) {
   Bytes packet;
-  encode_qtm_names(base_and_tip(), packet);
-  BodyNames names = base_and_tip();
+  encode_qtm_names(base_then_tip(), packet);
+  BodyNames names = base_then_tip();
   const auto header = qtm_header(packet);
   ASSERT_TRUE(header);
   EXPECT_EQ(header->size, packet.size());
@@ -133,7 +133,7 @@ TEST(QtmPackets, CutAndChangedPacketsAreRefusedOrHarmless) {
     }
     std::string xml(kXml);
     xml[random() % xml.size()] = static_cast<char>(random());
-    BodyNames names = base_and_tip();
+    BodyNames names = base_then_tip();
     read_qtm_names(xml.substr(0, random() % xml.size()), names);
   }
 }
@@ -141,7 +141,7 @@ TEST(QtmPackets, CutAndChangedPacketsAreRefusedOrHarmless) {
 TEST(QtmPackets, DecodingAllocatesNothing) {
   const Bytes bytes = frame_of({turned(0.2F), turned(0.3F)});
   SentFrame frame;
-  BodyNames names = base_and_tip();
+  BodyNames names = base_then_tip();
   const long before = test::thread_allocations;
   EXPECT_TRUE(decode_qtm_frame(bytes, frame));
   read_qtm_names(kXml, names);
