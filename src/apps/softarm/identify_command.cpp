@@ -97,8 +97,9 @@ int identify(IdentifyCommand& command) {
     return kExitOk;
   }
   Refinement fit = softarm::identify(set, records, command.options);
-  const Misfit misfit = judge_misfit(configured(experiment), experiment.actuation.kind,
-                                     command.choice, records, fit, command.options.refinement);
+  const Misfit misfit =
+      judge_misfit(configured(experiment), experiment.actuation.kind, command.choice, records, fit,
+                   command.options.refinement, command.logs.empty());
   widen(misfit, fit);
   fmt::print("{}{}{}", fit_table(set, fit), conditioning_text(set, fit), misfit_text(misfit));
   if (command.logs.size() == 1) fmt::print("{}", residual_parts_text(residual_parts(record, fit)));

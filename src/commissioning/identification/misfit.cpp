@@ -29,7 +29,7 @@ constexpr Candidate kCandidates[] = {
 
 Misfit judge_misfit(const ArmHypothesis& start, ActuationKind kind, const FitChoice& choice,
                     std::span<const MotionRecord> records, const Refinement& fit,
-                    const RefinementOptions& options) {
+                    const RefinementOptions& options, bool seek_causes) {
   Misfit out;
   out.shift.setZero(fit.x.size());
   double squares = 0.0;
@@ -40,7 +40,7 @@ Misfit judge_misfit(const ArmHypothesis& start, ActuationKind kind, const FitCho
   out.noise_rad = std::sqrt(squares / static_cast<double>(records.size()));
   out.ratio = fit.rms_rad / out.noise_rad;
   out.significant = out.ratio > kMisfit;
-  if (!out.significant) return out;
+  if (!out.significant || !seek_causes) return out;
 
   const ParameterSet set(start, kind, choice);
   struct Tried {
@@ -117,7 +117,11 @@ std::string misfit_text(const Misfit& misfit) {
                         &cause == &misfit.causes.front() ? "likely cause" : "or", cause.name,
                         cause.value, cause.unit == "1" ? "times" : cause.unit,
                         cause.rms_rad / misfit.noise_rad);
-  if (misfit.causes.empty()) return text + "no cause was found; intervals count noise only\n";
+  if (misfit.causes.empty())
+    return text +
+           "no cause is known: intervals count noise only; --choose-terms and --load, --length, "
+           "--mass "
+           "seek one\n";
   return text + "intervals are widened by what these causes would change; free one to know more\n";
 }
 

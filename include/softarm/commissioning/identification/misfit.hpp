@@ -30,10 +30,11 @@ struct Misfit {
 
 /// A residual beyond 1.25 times the noise is no noise (a thousand frames scatter by 3 %). Then a load
 /// at the tip, another length, other masses, hysteresis, a rest offset and a cubic stiffness are
-/// freed in turn, as far as `choice` has them fixed.
+/// freed in turn, as far as `choice` has them fixed; each takes as long as identifying.
+/// @param seek_causes  false: none of that
 Misfit judge_misfit(const ArmHypothesis& start, ActuationKind kind, const FitChoice& choice,
                     std::span<const MotionRecord> records, const Refinement& fit,
-                    const RefinementOptions& options);
+                    const RefinementOptions& options, bool seek_causes = true);
 
 /// Widens the intervals of `fit` by the shift.
 void widen(const Misfit& misfit, Refinement& fit);

@@ -1,11 +1,8 @@
-// Arms that lag, remember and carry what nobody entered: responses against closed forms, terms that
-// are chosen because they are there, and misfit that is noticed.
+// Arms that lag and remember: responses against closed forms, and terms that are chosen because they
+// are there.
 #include <gtest/gtest.h>
 
-#include <algorithm>
-
 #include "softarm/commissioning/identification/fit_report.hpp"
-#include "softarm/commissioning/identification/misfit.hpp"
 #include "softarm/commissioning/identification/term_selection.hpp"
 #include "softarm/commissioning/identification/tip_prediction.hpp"
 #include "softarm/config/load.hpp"
@@ -186,47 +183,6 @@ reference: [{kind: set_point, theta_rad: 0}]
   EXPECT_LT((loaded.elongation.saturation_1pbar - stretch.saturation_1pbar).norm(), 1e-6);
   EXPECT_NEAR(loaded.elongation.friction_m, 1e-3, 1e-9);
   EXPECT_NEAR(loaded.elongation.remanence.time_s, 40.0, 1e-9);
-}
-
-TEST(Misfit, ALoadAtTheTipIsNoticedAndNamed) {
-  Experiment experiment = test::one_segment();
-  experiment.plant.payload_kg = {0.05};
-  MotionRecord record = test::plant_record(experiment, 4, 0.2, 0.5, 100.0);
-  test::add_noise(record, 1e-3, 0.0, 5);
-  record.noise_rad = 1e-3;
-  FitChoice choice;
-  choice.gains = GainSharing::arm;
-  choice.lag = choice.delay = false;
-  const ArmHypothesis start = configured(experiment);
-  const ParameterSet set(start, ActuationKind::chambers, choice);
-  RefinementOptions options;
-  options.threads = 2;
-  Refinement fit = refine(set, record, set.configured(), options);
-  const double truth = experiment.arm.segments[0].stiffness_nm_per_rad / set[0].scale;
-  const Misfit misfit =
-      judge_misfit(start, ActuationKind::chambers, choice, std::span(&record, 1), fit, options);
-  ASSERT_TRUE(misfit.significant);
-  ASSERT_FALSE(misfit.causes.empty());
-  EXPECT_GT(std::abs(fit.x[0] - truth), fit.half_width(0)) << "noise alone does not explain it";
-  widen(misfit, fit);
-  EXPECT_LT(std::abs(fit.x[0] - truth), fit.half_width(0));
-  const auto load =
-      std::find_if(misfit.causes.begin(), misfit.causes.end(),
-                   [](const MisfitCause& it) { return it.name == "load at the tip"; });
-  ASSERT_NE(load, misfit.causes.end());
-  EXPECT_NEAR(load->value, 0.05, 0.002);
-  EXPECT_LT(load->rms_rad, 1.05e-3);
-  EXPECT_NE(misfit_text(misfit).find("load at the tip"), std::string::npos);
-
-  // Nothing is wrong with an arm that is as modelled.
-  experiment.plant.payload_kg = {0.0};
-  record = test::plant_record(experiment, 4, 0.2, 0.5, 100.0);
-  test::add_noise(record, 1e-3, 0.0, 5);
-  record.noise_rad = 1e-3;
-  fit = refine(set, record, set.configured(), options);
-  EXPECT_FALSE(
-      judge_misfit(start, ActuationKind::chambers, choice, std::span(&record, 1), fit, options)
-          .significant);
 }
 
 TEST(TipPrediction, ChordsOfConstantCurvatureGiveTheTip) {
