@@ -30,7 +30,7 @@ SegmentVector gains(const char* name, const ArmParameters& arm, const std::vecto
                     const std::vector<double>& axial) {
   const int n = arm.size(), width = arm.segment_dof();
   check_gains(name, bending, 2 * n, "2");
-  if (!axial.empty()) check_gains(name, axial, n, "1 along e");
+  if (arm.extensible && !axial.empty()) check_gains(name, axial, n, "1 along e");
   SegmentVector out(arm.dof());
   for (int i = 0; i < n; ++i) {
     const auto k = static_cast<std::size_t>(i);

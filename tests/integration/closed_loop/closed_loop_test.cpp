@@ -166,9 +166,10 @@ TEST(ClosedLoop, AnElongationIsFollowedAsFarAsPressuresCan) {
 }
 
 TEST(ClosedLoop, TheTipOfAnArmThatStretchesGoesUpAndDown) {
-  const Stretching found = stretch(configured("paper_arm_stretching_circle.yaml"), 15.0, 2.0);
+  const Stretching found = stretch(configured("paper_arm_stretching_circle.yaml"), 12.0, 3.0);
   EXPECT_LE(found.tip_rms_m, 0.6e-3);
-  EXPECT_GT(found.most_m - found.least_m, 7e-3);
+  EXPECT_GT(found.most_m - found.least_m, 10e-3);
+  EXPECT_LE(found.elongation_rms_m, 0.1e-3);
 }
 
 TEST(ClosedLoop, SomeSegmentsStretch) {

@@ -134,7 +134,7 @@ TEST(AxialChamberMap, PressuresAreContinuous) {
       Eigen::Vector3d from, to;
       for (int i = 0; i < 3; ++i) {
         from[i] = far[i] * random(engine);
-        to[i] = far[i] * random(engine);
+        to[i] = from[i] + 0.2 * far[i] * random(engine);
       }
       constexpr int kSteps = 2000;
       Eigen::VectorXd before = segment.allocate(from);
@@ -146,8 +146,9 @@ TEST(AxialChamberMap, PressuresAreContinuous) {
         before = now;
       }
     }
-    // bar a bar: a jump of 0.1 bar within one of these steps would be far above.
-    EXPECT_LT(steepest, 10.0) << chambers;
+    // bar a bar; three neighbours of six chambers span some direction badly. A jump of 0.1 bar within
+    // one of these steps would be a hundred or more.
+    EXPECT_LT(steepest, 40.0) << chambers;
   }
 }
 
