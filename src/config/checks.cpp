@@ -14,7 +14,6 @@
 #include "config/plausibility.hpp"
 #include "softarm/actuation/pressure_allocator.hpp"
 #include "softarm/base/time.hpp"
-#include "softarm/control/curvature_controller.hpp"
 #include "softarm/control/reference.hpp"
 #include "softarm/runtime/safety_monitor.hpp"
 #include "softarm/valves/register_map.hpp"
@@ -51,7 +50,8 @@ class Checks {
     check_valves();
     check_loads();
     check_module("control", "settings the controller can use", [&] {
-      std::make_unique<CurvatureController>(experiment_.arm, experiment_.control);
+      experiment_.control.law.make(
+          {experiment_.arm, experiment_.control, chamber_count(experiment_.actuation)});
     });
     check_reference();
   }

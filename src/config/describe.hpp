@@ -37,6 +37,6 @@ struct ChannelKey {
   int fewest;
   const char* doc;
 };
-extern const std::array<ChannelKey, 11> kChannelKeys;
+extern const std::array<ChannelKey, 14> kChannelKeys;
 
 }  // namespace softarm

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <softarm_messages/controller_status_t.hpp>
+#include <softarm_messages/law_state_t.hpp>
 #include <softarm_messages/pressure_command_t.hpp>
 #include <softarm_messages/torque_command_t.hpp>
 #include <string>
@@ -36,12 +37,16 @@ class OutputMessages {
   /// does not know. The command of the same tick must have been set.
   void set_status(std::int64_t tick, const ControlPipeline& pipeline) noexcept;
 
+  /// Fills what an external law is to answer, except `time_us` and `nonce`. The output must have it.
+  void set_law_state(std::int64_t tick, const TickOutput& output) noexcept;
+
   /// Whether commands are torques: another type, which no valve terminal decodes.
   bool by_torque() const noexcept { return by_torque_; }
 
   softarm_messages::pressure_command_t pressure_command;
   softarm_messages::torque_command_t torque_command;
   softarm_messages::controller_status_t status;
+  softarm_messages::law_state_t law_state;
 
  private:
   bool by_torque_;
