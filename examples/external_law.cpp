@@ -12,7 +12,7 @@
 
 using namespace softarm;
 
-constexpr double kStiffness_nm_per_rad = 0.6, kDamping_nms_per_rad = 0.02;
+constexpr double kStiffness_nm_per_rad = 0.6, kDamping_nms_per_rad = 0.01;
 
 int main(int argc, char** argv) try {
   if (argc < 2)
