@@ -295,6 +295,54 @@ class ControlPipeline:
         ...
 class PlantError(RuntimeError):
     pass
+class LawState:
+    """
+    What a control law of one's own is to answer, of the instant at which its answer acts. Unless
+    ACTIVE, the reference rests where the arm is.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def acceleration_ref(self) -> numpy.ndarray:
+        """
+        (2n,), rad/s^2
+        """
+    @property
+    def active_s(self) -> float:
+        """
+        since the arm became ACTIVE, otherwise 0
+        """
+    @property
+    def mode(self) -> str:
+        ...
+    @property
+    def pressure_bar(self) -> numpy.ndarray:
+        """
+        commanded, (chambers,), bar
+        """
+    @property
+    def tick(self) -> int:
+        ...
+    @property
+    def u(self) -> numpy.ndarray:
+        """
+        (2n,), rad
+        """
+    @property
+    def u_ref(self) -> numpy.ndarray:
+        """
+        (2n,), rad
+        """
+    @property
+    def velocity(self) -> numpy.ndarray:
+        """
+        (2n,), rad/s
+        """
+    @property
+    def velocity_ref(self) -> numpy.ndarray:
+        """
+        (2n,), rad/s
+        """
 class Plant:
     """
     The simulated arm of an experiment behind its valves, with its true state.
@@ -377,6 +425,19 @@ class Status:
     def frames_rejected(self) -> int:
         ...
     @property
+    def law_answers(self) -> dict:
+        """
+        answers of an external law, by what became of them
+        """
+    @property
+    def law_round_trip_s(self) -> float:
+        ...
+    @property
+    def references_refused(self) -> dict:
+        """
+        live references and targets of the tip that were refused, by reason
+        """
+    @property
     def mode(self) -> str:
         ...
     @property
@@ -453,6 +514,11 @@ class ArmClient:
     """
     def __init__(self, experiment: Experiment) -> None:
         ...
+    def answer_law(self, state: LawState, values: numpy.ndarray, pressures: bool = False, validity_s: float = 0.05) -> None:
+        """
+        Answer it by a generalized force (2n, N m) or by pressures (bar, one a chamber), valid for
+        validity_s from the state on.
+        """
     def command_chambers(self, pressure_bar: numpy.ndarray) -> None:
         """
         Move the set points towards these (bar, one a chamber) within the experiment's limits and
@@ -479,6 +545,10 @@ class ArmClient:
         """
         u, u', u'' (2n each; rad, rad/s, rad/s^2) for a daemon whose phase is `live`.
         """
+    def send_tip_target(self, position_m: numpy.ndarray, velocity_mps: numpy.ndarray = ...) -> None:
+        """
+        A target of the tip in the world (m, m/s) for a daemon whose phase is `live_tip`.
+        """
     def stop_recording(self) -> None:
         ...
     def update(self, patience_s: float = 0.0) -> bool:
@@ -488,6 +558,10 @@ class ArmClient:
     def vent_to_rest(self) -> None:
         """
         Vent completely; blocks.
+        """
+    def wait_for_law_state(self, patience_s: float) -> LawState | None:
+        """
+        The next state that a law of one's own is to answer; None if none comes.
         """
     def wait_for_status(self, patience_s: float) -> bool:
         """
@@ -527,10 +601,11 @@ def polar_to_u(q: numpy.ndarray) -> numpy.ndarray:
     """
     u of [phi_1, theta_1, ...], rad.
     """
-def run(experiment: Experiment, duration_s: float) -> dict:
+def run(experiment: Experiment, duration_s: float, law: typing.Any = None) -> dict:
     """
     Run an experiment in lock step; a dict of arrays with one row a tick:
     t_s, mode, u, u_ref, u_true (rad), command_bar, pressure_bar, tip_m (world).
+    law: a control law of one's own in place of the experiment's, see softarm.law.
     """
 def u_to_polar(u: numpy.ndarray) -> numpy.ndarray:
     """

@@ -34,6 +34,15 @@ const char* outcome_name(RequestOutcome outcome) {
   return "unheard";
 }
 
+/// Of those that are not zero.
+template <class Verdict, class Counts>
+py::dict counts_by_name(const Counts& counts) {
+  py::dict named;
+  for (std::size_t k = 0; k < counts.size(); ++k)
+    if (counts[k] > 0) named[name(static_cast<Verdict>(k))] = counts[k];
+  return named;
+}
+
 PressureVector chambers(const ArmClient& arm, const VectorXd& value) {
   return expect(value, chamber_count(arm.experiment().actuation), "pressure_bar");
 }
@@ -52,6 +61,15 @@ void bind_messages(py::module_& module) {
       .def_readonly("soft_limit", &ArmStatus::soft_limit)
       .def_readonly("frame_age_s", &ArmStatus::frame_age_s)
       .def_readonly("frames_rejected", &ArmStatus::frames_rejected)
+      .def_property_readonly(
+          "references_refused",
+          [](const ArmStatus& s) { return counts_by_name<LiveVerdict>(s.references_refused); },
+          "live references and targets of the tip that were refused, by reason")
+      .def_property_readonly(
+          "law_answers",
+          [](const ArmStatus& s) { return counts_by_name<LawVerdict>(s.law_answers); },
+          "answers of an external law, by what became of them")
+      .def_readonly("law_round_trip_s", &ArmStatus::law_round_trip_s)
       .def_property_readonly("u", [](const ArmStatus& s) { return VectorXd(s.u_rad); })
       .def_property_readonly("velocity",
                              [](const ArmStatus& s) { return VectorXd(s.velocity_radps); })
@@ -119,6 +137,37 @@ void bind_client(py::module_& module) {
           },
           py::arg("u"), py::arg("velocity"), py::arg("acceleration"),
           "u, u', u'' (2n each; rad, rad/s, rad/s^2) for a daemon whose phase is `live`.")
+      .def(
+          "send_tip_target",
+          [](ArmClient& arm, const Eigen::Vector3d& position, const Eigen::Vector3d& velocity) {
+            arm.send_tip_target(position, velocity);
+          },
+          py::arg("position_m"), py::arg("velocity_mps") = Eigen::Vector3d(0.0, 0.0, 0.0),
+          "A target of the tip in the world (m, m/s) for a daemon whose phase is `live_tip`.")
+      .def(
+          "wait_for_law_state",
+          [](ArmClient& arm, double patience_s) -> std::optional<LawRequest> {
+            const std::int64_t before = arm.law_request() ? arm.law_request()->tick : -1;
+            const auto newer = [&] {
+              return arm.law_request() && arm.law_request()->tick != before;
+            };
+            if (!arm.wait_for(newer, patience_s)) return std::nullopt;
+            return arm.law_request();
+          },
+          py::arg("patience_s"), release,
+          "The next state that a law of one's own is to answer; None if none comes.")
+      .def(
+          "answer_law",
+          [](ArmClient& arm, const LawRequest& state, const VectorXd& values, bool pressures,
+             double validity_s) {
+            pressures ? arm.answer_pressures(state, values, validity_s)
+                      : arm.answer_force(state, values, validity_s);
+          },
+          py::arg("state"), py::arg("values"), py::arg("pressures") = false,
+          py::arg("validity_s") = 0.05,
+          "Answer it by a generalized force (2n, N m) or by pressures (bar, one a chamber), valid "
+          "for\n"
+          "validity_s from the state on.")
       .def("lock_commands", &ArmClient::lock_commands,
            "Take softarmd's place on this machine. RuntimeError while another program has it.")
       .def(

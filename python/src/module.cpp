@@ -105,4 +105,5 @@ PYBIND11_MODULE(_core, module) {
   bind_control(module);
   bind_simulation(module);
   bind_client(module);
+  bind_law(module);
 }

@@ -21,6 +21,7 @@ void bind_model(py::module_& module);
 void bind_control(py::module_& module);
 void bind_simulation(py::module_& module);
 void bind_client(py::module_& module);
+void bind_law(py::module_& module);
 
 /// An argument of `size` finite numbers, itself: for use within the same expression.
 /// @throws std::invalid_argument (ValueError) naming it.

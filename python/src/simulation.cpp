@@ -16,6 +16,7 @@
 #include "softarm/simulation/arm_plant.hpp"
 #include "softarm/simulation/lock_step.hpp"
 #include "softarm/simulation/simulated_arm.hpp"
+#include "softarm/transport/arm_messages.hpp"
 
 namespace softarm::python {
 namespace {
@@ -75,8 +76,41 @@ void advance_all(const std::vector<ArmPlant*>& plants, double duration_s,
   if (failure) std::rethrow_exception(failure);
 }
 
+/// Asks softarm.law.Answers.
+class PythonLaw {
+ public:
+  explicit PythonLaw(const py::object& answers) : answers_(answers.ptr()) {}
+  bool operator()(const TickOutput& output, LawInput& answer) {
+    const py::gil_scoped_acquire acquire;
+    LawRequest state;
+    state.tick = ++ticks_;
+    state.mode = output.mode;
+    state.active_s = output.law->active_s;
+    state.u_rad = output.law->u_rad;
+    state.velocity_radps = output.law->velocity_radps;
+    state.reference_u_rad = output.law->reference.u;
+    state.reference_velocity_radps = output.law->reference.velocity;
+    state.reference_acceleration_radps2 = output.law->reference.acceleration;
+    state.pressure_bar = output.pressure_bar.cast<float>().cast<double>();  // as on the wire
+    const auto given = py::reinterpret_borrow<py::object>(answers_)(state).cast<py::tuple>();
+    answer.values = given[0].cast<VectorXd>();
+    answer.answer = given[1].cast<bool>() ? LawAnswer::pressures : LawAnswer::force;
+    answer.validity_ns = to_ns(std::clamp(given[2].cast<double>(), 0.0, 1e3));
+    return true;
+  }
+
+ private:
+  PyObject* answers_;  ///< the caller's: copies are made without the interpreter's lock
+  std::int64_t ticks_ = 0;
+};
+
 /// The columns of log.csv that a program reads most, one row a tick.
-py::dict run(const Experiment& experiment, double duration_s) {
+py::dict run(const Experiment& asked, double duration_s, const py::object& law) {
+  Experiment experiment = asked;
+  if (!law.is_none()) experiment.control.law = ExternalLaw{};
+  if (law.is_none() && experiment.control.law.get_if<ExternalLaw>() != nullptr) {
+    throw std::invalid_argument("law: expected one, since control.law is external");
+  }
   if (!(duration_s > 0.0) || !std::isfinite(duration_s)) {
     throw std::invalid_argument("duration_s: expected a time > 0 in s");
   }
@@ -90,9 +124,14 @@ py::dict run(const Experiment& experiment, double duration_s) {
   Rows commanded = Rows::Constant(ticks, chambers, unknown), measured = commanded;
   Rows tip = Rows::Constant(ticks, 3, unknown);
   std::vector<std::string> mode(static_cast<std::size_t>(ticks));
+  py::object answers;
+  if (!law.is_none()) {
+    answers = py::module_::import("softarm.law").attr("Answers")(law, py::cast(asked));
+  }
   {
     const py::gil_scoped_release release;
     const auto loop = std::make_unique<LockStep>(experiment, experiment.plant);
+    if (!law.is_none()) loop->set_law(PythonLaw(answers));
     LogRow row;
     const auto put = [](const auto& from, auto to) {
       if (from.size() == to.size()) to = from.transpose();
@@ -196,9 +235,10 @@ void bind_simulation(py::module_& module) {
       .def_property_readonly("plant", &SimulatedArm::plant,
                              py::return_value_policy::reference_internal);
 
-  module.def("run", &run, py::arg("experiment"), py::arg("duration_s"),
+  module.def("run", &run, py::arg("experiment"), py::arg("duration_s"), py::arg("law") = py::none(),
              "Run an experiment in lock step; a dict of arrays with one row a tick:\n"
-             "t_s, mode, u, u_ref, u_true (rad), command_bar, pressure_bar, tip_m (world).");
+             "t_s, mode, u, u_ref, u_true (rad), command_bar, pressure_bar, tip_m (world).\n"
+             "law: a control law of one's own in place of the experiment's, see softarm.law.");
 }
 
 }  // namespace softarm::python

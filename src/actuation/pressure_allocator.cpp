@@ -189,6 +189,21 @@ void PressureAllocator::allocate(ConstVectorRef tau_actuation_nm, Allocation& ou
   }
 }
 
+void PressureAllocator::largest_scale(ConstVectorRef tau_actuation_nm,
+                                      SegmentScalars& scale) const noexcept {
+  scale.resize(segments_);
+  for (int i = 0; i < segments_; ++i) {
+    const double x = tau_actuation_nm[2 * i], y = tau_actuation_nm[2 * i + 1];
+    if (max_torque_nm_ > 0.0) {
+      const double largest = std::max(std::abs(x), std::abs(y));
+      scale[i] = !std::isfinite(largest) ? 0.0 : std::min(1.0, max_torque_nm_ / largest);
+    } else {
+      scale[i] = planar_ ? segment_[i].planar.largest_scale({plane_[0] * x + plane_[1] * y})
+                         : segment_[i].spatial.largest_scale({x, y});
+    }
+  }
+}
+
 void PressureAllocator::torque(ConstVectorRef pressures_bar,
                                VectorRef tau_actuation_nm) const noexcept {
   if (max_torque_nm_ > 0.0) {

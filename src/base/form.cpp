@@ -29,6 +29,8 @@ constexpr std::array kUnits = std::to_array<std::pair<std::string_view, std::str
     {"_per_sqrt_s", "1/s^0.5"},
     {"_radps", "rad/s"},
     {"_mps2", "m/s^2"},
+    {"_mps", "m/s"},
+    {"_radps2", "rad/s^2"},
     {"_1ps", "1/s"},
     {"_bar", "bar"},
     {"_rad", "rad"},

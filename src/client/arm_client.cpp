@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <stdexcept>
 #include <utility>
 
@@ -21,9 +22,9 @@ constexpr std::int64_t kRest_ns = 1'000'000'000;
 
 std::vector<double> checked(ConstVectorRef numbers, int expected, const char* what) {
   if (numbers.size() != expected || !numbers.allFinite())
-    throw std::invalid_argument(
-        fmt::format("{} of a reference: expected {} finite numbers, got {}{}", what, expected,
-                    numbers.size(), numbers.allFinite() ? "" : ", not all finite"));
+    throw std::invalid_argument(fmt::format("{}: expected {} finite numbers, got {}{}", what,
+                                            expected, numbers.size(),
+                                            numbers.allFinite() ? "" : ", not all finite"));
   return {numbers.begin(), numbers.end()};
 }
 
@@ -73,6 +74,12 @@ struct ArmClient::State {
     if (on_plant) on_plant(newest);
     plant = std::move(newest);
   }
+  void take_law_request(const ArmMessage& message) {
+    LawRequest newest;
+    if (!decode(message.bytes, newest) || newest.u_rad.size() != experiment.arm.dof()) return;
+    law_request = std::move(newest);
+    if (on_law_request) on_law_request(*law_request);
+  }
   void take_valves(const ArmMessage& message) {
     if (ValvesStatus newest; decode(message.bytes, newest)) valves = std::move(newest);
   }
@@ -96,6 +103,8 @@ struct ArmClient::State {
   std::function<void(const MeasuredPressures&)> on_measured;
   std::function<void(const PlantState&)> on_plant;
   std::function<void(const ChamberCommand&)> on_command;
+  std::optional<LawRequest> law_request;
+  std::function<void(const LawRequest&)> on_law_request;
   std::optional<InstanceLock> lock;
   std::optional<CommandRamp> ramp;
   std::optional<std::int32_t> valves_expired;  ///< count in their last report
@@ -114,6 +123,9 @@ ArmClient::ArmClient(Experiment experiment, Clock clock)
   listen(lcm.measurement_channel,
          [&state](const ArmMessage& message) { state.take_measurement(message); });
   listen(lcm.valves_channel, [&state](const ArmMessage& message) { state.take_valves(message); });
+  if (state.experiment.control.law.get_if<ExternalLaw>() != nullptr)
+    listen(lcm.law_state_channel,
+           [&state](const ArmMessage& message) { state.take_law_request(message); });
   listen(lcm.plant_channel, [&state](const ArmMessage& message) { state.take_plant(message); });
 }
 
@@ -128,6 +140,7 @@ ArmClient::~ArmClient() {
   on_measured({});
   on_plant({});
   on_command({});
+  on_law_request({});
   try {
     if (state_->ramp && !state_->ramp->set_points_bar().isZero(0.0)) vent_to_rest();
   } catch (...) {  // if nothing can be sent any more, the command expires
@@ -178,11 +191,51 @@ void ArmClient::send_reference(ConstVectorRef u_rad, ConstVectorRef velocity_rad
   const int dof = 2 * experiment().arm.size();
   softarm_messages::curvature_reference_t message;
   message.dimension = static_cast<std::int16_t>(dof);
-  message.u_rad = checked(u_rad, dof, "u");
-  message.velocity_radps = checked(velocity_radps, dof, "velocity");
-  message.acceleration_radps2 = checked(acceleration_radps2, dof, "acceleration");
+  message.u_rad = checked(u_rad, dof, "u of a reference");
+  message.velocity_radps = checked(velocity_radps, dof, "velocity of a reference");
+  message.acceleration_radps2 = checked(acceleration_radps2, dof, "acceleration of a reference");
   message.sequence = next_sequence();
   publish(experiment().transport.lcm.reference_channel, message);
+}
+
+void ArmClient::send_tip_target(const Eigen::Vector3d& position_m,
+                                const Eigen::Vector3d& velocity_mps) {
+  if (!position_m.allFinite() || !velocity_mps.allFinite())
+    throw std::invalid_argument("target of the tip: expected finite numbers");
+  softarm_messages::tip_target_t message;
+  message.sequence = next_sequence();
+  std::copy(position_m.begin(), position_m.end(), message.position_m);
+  std::copy(velocity_mps.begin(), velocity_mps.end(), message.velocity_mps);
+  publish(experiment().transport.lcm.tip_channel, message);
+}
+
+const std::optional<LawRequest>& ArmClient::law_request() const { return state_->law_request; }
+void ArmClient::on_law_request(std::function<void(const LawRequest&)> callback) {
+  state_->on_law_request = std::move(callback);
+}
+
+void ArmClient::answer(const LawRequest& request, std::int8_t answer, ConstVectorRef values,
+                       int expected, double validity_s) {
+  softarm_messages::law_command_t message;
+  message.nonce = request.nonce;
+  message.answer = answer;
+  message.num_values = static_cast<std::int16_t>(expected);
+  message.value = checked(values, expected, "answer of a law");
+  message.validity_us = static_cast<std::int32_t>(1e6 * std::clamp(validity_s, 0.0, 1e3));
+  message.sequence = next_sequence();
+  publish(experiment().transport.lcm.law_channel, message);
+}
+
+void ArmClient::answer_force(const LawRequest& request, ConstVectorRef force_nm,
+                             double validity_s) {
+  answer(request, softarm_messages::law_command_t::FORCE, force_nm, experiment().arm.dof(),
+         validity_s);
+}
+
+void ArmClient::answer_pressures(const LawRequest& request, ConstVectorRef pressure_bar,
+                                 double validity_s) {
+  answer(request, softarm_messages::law_command_t::PRESSURES, pressure_bar,
+         chamber_count(experiment().actuation), validity_s);
 }
 
 void ArmClient::lock_commands() {

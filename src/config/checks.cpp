@@ -14,7 +14,6 @@
 #include "config/plausibility.hpp"
 #include "softarm/actuation/pressure_allocator.hpp"
 #include "softarm/base/time.hpp"
-#include "softarm/control/curvature_controller.hpp"
 #include "softarm/control/reference.hpp"
 #include "softarm/runtime/elongation_reference.hpp"
 #include "softarm/runtime/safety_monitor.hpp"
@@ -54,7 +53,8 @@ class Checks {
     check_loads();
     check_contact();
     check_module("control", "settings the controller can use", [&] {
-      std::make_unique<CurvatureController>(experiment_.arm, experiment_.control);
+      experiment_.control.law.make(
+          {experiment_.arm, experiment_.control, chamber_count(experiment_.actuation)});
     });
     check_reference();
   }
@@ -132,6 +132,11 @@ class Checks {
        "actuation by torque, which has no axial force");
     no(experiment_.actuation.plane_rad.has_value(), "actuation.plane_rad");
     no(experiment_.control.coordinates == ControlCoordinates::polar, "control.coordinates: polar");
+    no(!experiment_.control.law.get_if<CurvatureLaw>() &&
+           !experiment_.control.law.get_if<StaticsPiLaw>(),
+       "a control.law that knows no axial force");
+    for (const ReferencePhase& phase : experiment_.reference.phases)
+      no(phase.kind.get_if<LiveTipReference>() != nullptr, "reference: live_tip");
     no(experiment_.estimation.observer == ObserverKind::model, "estimation.observer: model");
     no(experiment_.estimation.method == CurvatureMethod::orientation,
        "estimation.method: orientation, which measures no lengths");

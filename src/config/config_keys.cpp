@@ -212,6 +212,13 @@ ConfigError ConfigKeys::error_at(const std::string& path, const std::string& exp
   return {*where.file, where.line, path, expected, got};
 }
 
+std::filesystem::path ConfigKeys::beside(const char* key, const std::filesystem::path& path) const {
+  if (frames_.empty()) return path;
+  const auto found = locations_.find(frames_.back().path_of(key));
+  if (found == locations_.end()) return path;
+  return std::filesystem::path(*found->second.file).parent_path() / path;
+}
+
 /// What stands at a key of the section being read; nullptr where it is left out.
 const YamlNode* ConfigKeys::take(const Key& key, const std::string& expected) {
   if (!reading()) return nullptr;

@@ -37,6 +37,6 @@ struct ChannelKey {
   int fewest;
   const char* doc;
 };
-extern const std::array<ChannelKey, 12> kChannelKeys;
+extern const std::array<ChannelKey, 15> kChannelKeys;
 
 }  // namespace softarm

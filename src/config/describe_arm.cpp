@@ -3,6 +3,7 @@
 #include <numeric>
 
 #include "config/describe.hpp"
+#include "softarm/control/control_laws.hpp"
 
 namespace softarm {
 
@@ -169,14 +170,33 @@ static void describe(Keys& key, TaskSpaceSettings& it) {
       "of learning how that difference depends on the place; 0: not learnt");
 }
 
+static void describe_law(Keys& key, LawKind& chosen) {
+  const auto names = control_laws().names();
+  std::size_t index = control_laws().index(chosen.name());
+  key("law", index, one_of(names),
+      "curvature: (17); statics_pi: G and K u_ref with PI; external: another process answers "
+      "law_state_t with law_command_t");
+  if (key.reading()) chosen = control_laws().all()[index];
+  for (LawKind kind : control_laws().all()) {
+    if (!kind.has_keys()) continue;
+    const bool it_is = std::string_view(kind.name()) == chosen.name();
+    key.section({kind.name(), "for the law of this name"},
+                [&] { (it_is ? chosen : kind).describe(key); });
+  }
+}
+
 static void describe(Keys& key, ControllerSettings& it) {
+  describe_law(key, it.law);
+  const bool has_gains =
+      it.law.get_if<CurvatureLaw>() != nullptr || it.law.get_if<StaticsPiLaw>() != nullptr;
+  const Presence presence = has_gains ? kRequired : Presence::optional;
   for (auto* gains : {&it.kp, &it.kd, &it.ki})
     gains->resize(static_cast<std::size_t>(2 * key.segments), 0.0);
   const Form gains = from(0, 1e4).one_or_pairs();
   KEY(coordinates, one_of({"u", "polar"}), "of (17): u (smooth everywhere) or polar (the paper's)");
   KEY(terms, "of (17); one that is left out costs nothing");
   key("kp_nm_per_rad", it.kp, gains,
-      "K_P: one for all, one a segment, or [x, y] a segment (polar: [phi, theta])", kRequired);
+      "K_P: one for all, one a segment, or [x, y] a segment (polar: [phi, theta])", presence);
   key("kd_nms_per_rad", it.kd, from(0, 1e3).one_or_pairs(), "K_D, in the same forms");
   key("ki_nm_per_rad_s", it.ki, gains, "integral gain on u, in the same forms; not in the paper");
   for (auto* each : {&it.kp_axial, &it.kd_axial, &it.ki_axial})

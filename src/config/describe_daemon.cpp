@@ -27,8 +27,9 @@ void describe_reference(Keys& key, ReferenceSettings& it) {
   key.list(list, it.phases, [&](ReferencePhase& phase) {
     std::size_t kind = reference_kinds().index(phase.kind.name());
     key("kind", kind, one_of(names),
-        "set_point: hold; paper: (24); way_points; live: what comes over LCM; tip_...: a path of "
-        "the tip by (21), tip_lemniscate: (22)",
+        "set_point: hold; paper: (24); way_points; live: what comes over LCM; live_tip: targets of "
+        "the tip over LCM, by (21); table: a CSV file; tip_...: a path of the tip by (21), "
+        "tip_lemniscate: (22)",
         kRequired);
     if (key.reading()) phase.kind = reference_kinds().all()[kind];
     key.when(&phase != &it.phases.back(), [&] {
@@ -91,6 +92,10 @@ static void describe(Keys& key, SafetySettings& it) {
   KEY(contact_segment, from(0, kMaxSegments),
       "the force of the model observer acts on the end of this segment; 0: the tip");
   KEY(deadman_timeout_s, above(0, 2), "without a go on lcm.deadman_channel: VENT");
+  KEY(law_validity_s, above(0, 0.5),
+      "of control.law: external; an answer counts no longer than that after the state that it "
+      "answers: then HOLD");
+  KEY(law_vent_after_s, above(0, 0.5), "after that without an answer: VENT");
 }
 
 static void describe_network(Keys& key, MocapSourceSettings& mocap) {
@@ -179,7 +184,7 @@ static void describe(Keys& key, RealtimeSettings& it) {
   KEY(lock_memory, "mlockall");
 }
 
-constinit const std::array<ChannelKey, 12> kChannelKeys = {{
+constinit const std::array<ChannelKey, 15> kChannelKeys = {{
     {"mocap_channel", &LcmSettings::mocap_channel, 1,
      "frames; left out: OPTITRACK_FRAMES for optitrack; VICON for rigid_transform, where it is "
      "what "
@@ -197,6 +202,9 @@ constinit const std::array<ChannelKey, 12> kChannelKeys = {{
     {"valves_channel", &LcmSettings::valves_channel, 1, "status of the valves' driver"},
     {"plant_channel", &LcmSettings::plant_channel, 1, "a simulated arm's true state"},
     {"deadman_channel", &LcmSettings::deadman_channel, 0, "go of a dead-man input; empty: none"},
+    {"tip_channel", &LcmSettings::tip_channel, 1, "live targets of the tip"},
+    {"law_state_channel", &LcmSettings::law_state_channel, 1, "what an external law is to answer"},
+    {"law_channel", &LcmSettings::law_channel, 1, "answers of an external law"},
 }};
 
 static void describe_lcm(Keys& key, LcmSettings& it, SafetySettings& safety) {

@@ -41,6 +41,7 @@ Experiment example_experiment() {
   tip.first_axis_m = {0.03, 0.0, 0.0};
   tip.second_axis_m = {0.0, 0.02, 0.0};
   example.reference.phases = {{LiveReference{}, 5.0},
+                              {LiveTipReference{}, 5.0},
                               {SetPointReference{{0.2, 0.0, 0.2, 0.0}}, 5.0},
                               {WayPointReference{points, true}, 20.0},
                               {tip, 10.0},

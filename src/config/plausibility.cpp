@@ -4,12 +4,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <numbers>
+#include <optional>
 
 #include "softarm/base/time.hpp"
 #include "softarm/control/reach.hpp"
 #include "softarm/runtime/elongation_reference.hpp"
 #include "softarm/runtime/safety_monitor.hpp"
+#include "softarm/runtime/static_hold.hpp"
 
 namespace softarm {
 namespace {
@@ -139,10 +142,38 @@ class Plausibility {
   const ConfigKeys& keys_;
 };
 
-/// The longest way from the path to where the tip can be, and for how much of it that is too long.
+/// A path of the tip at instants that cover it.
+struct TipPath {
+  std::function<Eigen::Vector3d(int)> at;
+  int instants = 0;
+  double largest_distance_m = 0.0;  ///< from the base
+};
+
+std::optional<TipPath> tip_path(const ReferenceKind& kind, const Eigen::Vector3d& base_m) {
+  constexpr int kInstants = 72;
+  if (const auto* path = kind.get_if<TipPathReference>()) {
+    TipPathReference unit = *path;
+    unit.rate_radps = 1.0;
+    const int instants = path->shape == TipPathShape::point ? 1 : kInstants;
+    return TipPath{
+        [=](int k) { return unit.tip(2.0 * std::numbers::pi * k / instants).position_m; }, instants,
+        path->largest_distance_m(base_m)};
+  }
+  const auto* table = kind.get_if<TableReference>();
+  if (table == nullptr || !table->is_tip_path()) return {};
+  TipPath path{[=](int k) { return table->tip(k * table->duration_s() / kInstants).position_m; },
+               kInstants + 1, 0.0};
+  for (int k = 0; k < path.instants; ++k)
+    path.largest_distance_m = std::max(path.largest_distance_m, (path.at(k) - base_m).norm());
+  return path;
+}
+
+/// The longest way from the path to where the tip can be, and for how much of it that is too long;
+/// and how much of the rest the chambers cannot hold, in the poses that were found.
 struct OutOfReach {
   double longest_m = 0.0;
   double part = 0.0;
+  double not_held = 0.0;
 };
 
 /// Of segments that stretch, with all chambers at the highest pressure; otherwise empty.
@@ -152,20 +183,30 @@ SegmentScalars most_elongation_m(const Experiment& experiment) {
                              experiment.actuation.max_pressure_bar);
 }
 
-OutOfReach out_of_reach(const Experiment& experiment, const TipPathReference& path) {
-  constexpr int kInstants = 72;
-  TipPathReference unit = path;
-  unit.rate_radps = 1.0;
-  const int instants = path.shape == TipPathShape::point ? 1 : kInstants;
+OutOfReach out_of_reach(const Experiment& experiment, const TipPath& path) {
+  constexpr double kRounding_rad = 1e-6;
   Eigen::VectorXd u = Eigen::VectorXd::Zero(experiment.arm.dof());
   const SegmentScalars stretch_m = most_elongation_m(experiment);
+  std::optional<StaticHold> hold;  // of segments that do not stretch
+  if (!experiment.arm.extensible) hold.emplace(experiment.arm, experiment.actuation);
+  Eigen::VectorXd bend(experiment.arm.size());
   OutOfReach out;
-  for (int k = 0; k < instants; ++k) {
-    const double away_m = distance_out_of_reach_m(
-        experiment.arm, experiment.control.max_theta_rad, experiment.actuation.plane_rad,
-        unit.tip(2.0 * std::numbers::pi * k / instants).position_m, u, stretch_m);
-    if (away_m > kReachTolerance * length_m(experiment.arm)) out.part += 1.0 / instants;
+  for (int k = 0; k < path.instants; ++k) {
+    const double away_m = distance_out_of_reach_m(experiment.arm, experiment.control.max_theta_rad,
+                                                  experiment.actuation.plane_rad, path.at(k), u,
+                                                  stretch_m);
     out.longest_m = std::max(out.longest_m, away_m);
+    if (away_m > kReachTolerance * length_m(experiment.arm)) {
+      out.part += 1.0 / path.instants;
+      continue;
+    }
+    if (!hold) continue;
+    hold->largest_bend(u, bend);
+    for (Eigen::Index i = 0; i < bend.size(); ++i) {
+      if (u.segment<2>(2 * i).norm() <= bend[i] + kRounding_rad) continue;
+      out.not_held += 1.0 / path.instants;
+      break;
+    }
   }
   return out;
 }
@@ -173,20 +214,26 @@ OutOfReach out_of_reach(const Experiment& experiment, const TipPathReference& pa
 void warn_of_paths(const Experiment& experiment, std::vector<std::string>& warnings) {
   const double arm_m = length_m(experiment.arm) + most_elongation_m(experiment).sum();
   for (std::size_t i = 0; i < experiment.reference.phases.size(); ++i) {
-    const auto* path = experiment.reference.phases[i].kind.get_if<TipPathReference>();
-    if (path == nullptr) continue;
-    const double away_m = path->largest_distance_m(experiment.arm.base_position_m);
-    if (away_m > arm_m) {
+    const auto path = tip_path(experiment.reference.phases[i].kind, experiment.arm.base_position_m);
+    if (!path) continue;
+    if (path->largest_distance_m > arm_m) {
       warnings.push_back(fmt::format(
           "reference[{}]: the path goes {:.4g} m away from the base, the arm is {:.4g} m "
           "long: the tip will stay behind",
-          i, away_m, arm_m));
-    } else if (const OutOfReach out = out_of_reach(experiment, *path); out.part > 0.0) {
+          i, path->largest_distance_m, arm_m));
+      continue;
+    }
+    const OutOfReach out = out_of_reach(experiment, *path);
+    if (out.part > 0.0)
       warnings.push_back(fmt::format(
           "reference[{}]: {:.0f} % of the path are out of reach within control.max_theta_rad, by "
           "up to {:.3g} m: the tip will stay behind",
           i, std::ceil(100.0 * out.part), out.longest_m));
-    }
+    if (out.not_held > 0.0)
+      warnings.push_back(fmt::format(
+          "reference[{}]: the chambers cannot hold the arm at rest on {:.0f} % of the path, in the "
+          "poses that a search finds: the tip may stay behind",
+          i, std::ceil(100.0 * out.not_held)));
   }
 }
 

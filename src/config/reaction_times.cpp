@@ -6,6 +6,7 @@
 #include "softarm/actuation/pressure_allocator.hpp"
 #include "softarm/base/time.hpp"
 #include "softarm/config/load.hpp"
+#include "softarm/control/control_laws.hpp"
 #include "softarm/runtime/safety_monitor.hpp"
 
 namespace softarm {
@@ -42,6 +43,11 @@ std::vector<std::string> reaction_times(const Experiment& experiment) {
   if (safety.deadman)
     line(FMT_STRING("  without a go of the dead-man input: VENT after {:.4g} s"),
          safety.deadman_timeout_s);
+  if (experiment.control.law.get_if<ExternalLaw>() != nullptr)
+    line(
+        FMT_STRING("  without an answer of the law: HOLD at most {:.4g} s after the state that the "
+                   "newest answers, VENT {:.4g} s later"),
+        safety.law_validity_s, safety.law_vent_after_s);
   line(FMT_STRING("  ticks missed in a row, under SCHED_FIFO: HOLD after {:.4g} s, VENT after "
                   "{:.4g} s"),
        safety.hold_overruns * tick_s, safety.vent_overruns * tick_s);

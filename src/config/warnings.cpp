@@ -8,6 +8,7 @@
 #include "softarm/actuation/pressure_allocator.hpp"
 #include "softarm/base/time.hpp"
 #include "softarm/config/load.hpp"
+#include "softarm/control/control_laws.hpp"
 #include "softarm/control/gain_check.hpp"
 #include "softarm/control/reference.hpp"
 #include "softarm/model/actuation_matrix.hpp"
@@ -54,10 +55,23 @@ class StaticReach {
       for (const WayPoint& point : way->points) smallest = std::min(smallest, scale(point.u_rad));
     }
     if (const auto* paper = kind.get_if<PaperReference>()) smallest = scale(*paper);
+    if (const auto* table = kind.get_if<TableReference>(); table && !table->is_tip_path())
+      smallest = scale(*table);
     return smallest;
   }
 
  private:
+  double scale(const TableReference& table) {
+    constexpr int kInstants = 1000;
+    ReferenceSample sample;
+    for (auto* v : {&sample.u, &sample.velocity, &sample.acceleration}) v->setZero(arm_.dof());
+    double smallest = 1.0;
+    for (int k = 0; k <= kInstants; ++k) {
+      table.evaluate(k * table.duration_s() / kInstants, sample);
+      smallest = std::min(smallest, scale({sample.u.begin(), sample.u.end()}));
+    }
+    return smallest;
+  }
   double scale(const PaperReference& paper) {
     constexpr int kInstants = 36;
     constexpr double kTwoPi = 6.283185307179586;
@@ -96,8 +110,13 @@ LoopSampling sampling_of(const Experiment& experiment) {
 }  // namespace
 
 std::vector<std::string> experiment_warnings(const Experiment& experiment) {
-  auto warnings = gain_warnings(experiment.arm, experiment.control, sampling_of(experiment),
-                                largest_theta_rad(experiment.reference));
+  std::vector<std::string> warnings;
+  const LawKind& law = experiment.control.law;
+  const bool statics = law.get_if<StaticsPiLaw>() != nullptr;
+  if (statics || law.get_if<CurvatureLaw>() != nullptr)
+    warnings = gain_warnings(experiment.arm,
+                             statics ? as_statics_pi(experiment.control) : experiment.control,
+                             sampling_of(experiment), largest_theta_rad(experiment.reference));
 
   if (const std::string other = network_warning(experiment.transport.lcm.url); !other.empty())
     warnings.push_back(other);

@@ -204,4 +204,15 @@ void LiveReference::check(const ReferencePlace& place, const ControllerSettings&
                 fmt::format("{}", timeout_s));
 }
 
+void LiveTipReference::describe(Keys& key) {
+  key("timeout_s", timeout_s, above(0, 1e3),
+      "silence after which a target that moves stops; one at rest needs no repetition");
+  key("max_speed_mps", max_speed_mps, above(0, 100), "of the target on its way to a new one");
+  key("max_acceleration_mps2", max_acceleration_mps2, above(0, 1e4), "the same");
+}
+
+void LiveTipReference::check(const ReferencePlace& place, const ControllerSettings&, int) const {
+  place.require_finite({timeout_s, max_speed_mps, max_acceleration_mps2});
+}
+
 }  // namespace softarm

@@ -9,24 +9,9 @@
 namespace softarm {
 namespace {
 
-constexpr int kIterations = 60;
+constexpr int kSteps = 60;
 constexpr double kLongestStep_rad = 0.5;
 constexpr double kGoodEnough = 1e-4;  ///< of the arm's length
-
-/// Within the limits on theta, and in the plane of a planar arm.
-void project(double max_theta_rad, std::optional<double> plane_rad,
-             const SegmentScalars& most_elongation_m, Eigen::Index width, Eigen::VectorXd& u) {
-  for (Eigen::Index i = 0; i < most_elongation_m.size(); ++i)
-    u[3 * i + 2] = std::clamp(u[3 * i + 2], 0.0, most_elongation_m[i]);
-  for (Eigen::Index i = 0; i < u.size(); i += width) {
-    if (plane_rad) {
-      const Eigen::Vector2d along(std::cos(*plane_rad), std::sin(*plane_rad));
-      u.segment<2>(i) = along * along.dot(u.segment<2>(i));
-    }
-    const double theta = u.segment<2>(i).norm();
-    if (theta > max_theta_rad) u.segment<2>(i) *= max_theta_rad / theta;
-  }
-}
 
 double length_m(const ArmParameters& arm) {
   double sum = 0.0;
@@ -36,41 +21,78 @@ double length_m(const ArmParameters& arm) {
 
 }  // namespace
 
+TipSearch::TipSearch(const ArmParameters& arm, double max_theta_rad,
+                     std::optional<double> plane_rad, const SegmentScalars& most_elongation_m)
+    : arm_(arm),
+      max_theta_rad_(max_theta_rad),
+      length_m_(length_m(arm)),
+      plane_rad_(plane_rad),
+      most_elongation_m_(most_elongation_m),
+      best_(SegmentVector::Zero(arm.dof())),
+      u_(best_),
+      step_(best_),
+      jacobian_(3, arm.dof()) {}
+
+/// Within the limits on theta and e, and in the plane of a planar arm.
+void TipSearch::project(SegmentVector& u) const noexcept {
+  for (Eigen::Index i = 0; i < most_elongation_m_.size(); ++i)
+    u[3 * i + 2] = std::clamp(u[3 * i + 2], 0.0, most_elongation_m_[i]);
+  for (Eigen::Index i = 0; i < u.size(); i += arm_.segment_dof()) {
+    if (plane_rad_) {
+      const Eigen::Vector2d along(std::cos(*plane_rad_), std::sin(*plane_rad_));
+      u.segment<2>(i) = along * along.dot(u.segment<2>(i));
+    }
+    const double theta = u.segment<2>(i).norm();
+    if (theta > max_theta_rad_) u.segment<2>(i) *= max_theta_rad_ / theta;
+  }
+}
+
+bool TipSearch::found() const noexcept { return nearest_m_ <= kGoodEnough * length_m_; }
+
+void TipSearch::begin(const Eigen::Vector3d& target_m, ConstVectorRef u_rad) noexcept {
+  target_m_ = target_m;
+  best_ = u_rad;
+  nearest_m_ = (target_m - tip_position(arm_, u_rad)).norm();
+  steps_ = 0;
+}
+
+void TipSearch::search(ConstVectorRef start, int steps) noexcept {
+  u_ = start;
+  for (int k = 0; k < steps && !found(); ++k, ++steps_) {
+    project(u_);
+    const Eigen::Vector3d error = target_m_ - tip_position(arm_, u_);
+    if (error.norm() < nearest_m_) {
+      nearest_m_ = error.norm();
+      best_ = u_;
+    }
+    tip_jacobian(arm_, u_, jacobian_);
+    Eigen::Matrix3d normal = jacobian_ * jacobian_.transpose();
+    normal.diagonal().array() += 0.05 * error.squaredNorm() + 1e-8 * length_m_ * length_m_;
+    const Eigen::Vector3d force = normal.llt().solve(error);
+    step_.noalias() = jacobian_.transpose() * force;
+    u_ += step_ * std::min(1.0, kLongestStep_rad / std::max(step_.norm(), 1e-12));
+  }
+}
+
+void TipSearch::search_from_arc(double part, int steps) noexcept {
+  const Eigen::Vector3d local = arm_.base_rotation.transpose() * (target_m_ - arm_.base_position_m);
+  const double towards = std::atan2(local.y(), local.x());
+  SegmentVector bend = best_;  // and its elongations
+  for (Eigen::Index i = 0; i < bend.size(); i += arm_.segment_dof())
+    bend.segment<2>(i) =
+        part * max_theta_rad_ * Eigen::Vector2d(std::cos(towards), std::sin(towards));
+  search(bend, steps);
+}
+
 double distance_out_of_reach_m(const ArmParameters& arm, double max_theta_rad,
                                std::optional<double> plane_rad, const Eigen::Vector3d& target_m,
                                Eigen::VectorXd& u_rad, const SegmentScalars& most_elongation_m) {
-  const double length = length_m(arm);
-  const Eigen::Vector3d local = arm.base_rotation.transpose() * (target_m - arm.base_position_m);
-  const double towards = std::atan2(local.y(), local.x());
-  Eigen::VectorXd best = u_rad;
-  double nearest_m = (target_m - tip_position(arm, u_rad)).norm();
-  Eigen::Matrix3Xd jacobian(3, arm.dof());
-  const auto search = [&](Eigen::VectorXd u) {
-    for (int k = 0; k < kIterations && nearest_m > kGoodEnough * length; ++k) {
-      project(max_theta_rad, plane_rad, most_elongation_m, arm.segment_dof(), u);
-      const Eigen::Vector3d error = target_m - tip_position(arm, u);
-      if (error.norm() < nearest_m) {
-        nearest_m = error.norm();
-        best = u;
-      }
-      tip_jacobian(arm, u, jacobian);
-      Eigen::Matrix3d normal = jacobian * jacobian.transpose();
-      normal.diagonal().array() += 0.05 * error.squaredNorm() + 1e-8 * length * length;
-      Eigen::VectorXd step = jacobian.transpose() * normal.llt().solve(error);
-      const double size = step.norm();
-      u += step * std::min(1.0, kLongestStep_rad / std::max(size, 1e-12));
-    }
-  };
-  search(u_rad);
-  for (const double part : {0.1, 0.5, -0.3, 0.9}) {
-    Eigen::VectorXd bend = u_rad;
-    for (Eigen::Index i = 0; i < bend.size(); i += arm.segment_dof())
-      bend.segment<2>(i) =
-          part * max_theta_rad * Eigen::Vector2d(std::cos(towards), std::sin(towards));
-    search(bend);
-  }
-  u_rad = best;
-  return nearest_m;
+  TipSearch tip(arm, max_theta_rad, plane_rad, most_elongation_m);
+  tip.begin(target_m, u_rad);
+  tip.search(u_rad, kSteps);
+  for (const double part : {0.1, 0.5, -0.3, 0.9}) tip.search_from_arc(part, kSteps);
+  u_rad = tip.u_rad();
+  return tip.distance_m();
 }
 
 }  // namespace softarm

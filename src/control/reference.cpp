@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
 #include <stdexcept>
@@ -10,6 +11,7 @@
 #include "control/blend.hpp"
 #include "control/soft_limit.hpp"
 #include "control/task_space_tracker.hpp"
+#include "softarm/control/reach.hpp"
 #include "softarm/model/kinematics.hpp"
 
 namespace softarm {
@@ -49,6 +51,15 @@ void check_phase(int phase, const ReferenceKind& kind, const ControllerSettings&
 
 }  // namespace
 
+const char* name(LiveVerdict verdict) noexcept {
+  constexpr std::array kNames{"accepted",     "not_live",      "wrong_size",
+                              "not_finite",   "out_of_limits", "step_too_large",
+                              "out_of_order", "unreachable",   "not_held"};
+  static_assert(kNames.size() == static_cast<std::size_t>(kLiveVerdicts));
+  const auto index = static_cast<std::size_t>(verdict);
+  return index < kNames.size() ? kNames[index] : "unknown";
+}
+
 double largest_theta_rad(const ReferenceSettings& settings) noexcept {
   double theta = 0.0;
   for (const ReferencePhase& phase : settings.phases) {
@@ -75,6 +86,7 @@ struct Reference::State {
     Blend join;
     Message message;
     std::optional<TaskSpaceTracker> tracker;  ///< where the phase is in task space
+    double max_tip_speed_mps = 0.0;           ///< of a live target
   };
 
   ArmParameters arm;
@@ -91,6 +103,9 @@ struct Reference::State {
   Eigen::Vector3d tip_m = Eigen::Vector3d::Zero();
   ReferenceSample from, to;  ///< scratch
   SegmentVector offset, offset_rate, zero;
+  HoldLimits* hold = nullptr;
+  SegmentVector bend;                   ///< scratch: what can be held
+  std::optional<TipSearch> tip_search;  ///< where a phase takes live targets of the tip
 
   const Phase& at(double time_s, int& index) const noexcept;
   void curve(const Phase& phase, double time_s, ReferenceSample& out) const noexcept;
@@ -101,6 +116,7 @@ struct Reference::State {
   void join(int index) noexcept;
   void join_following(int index) noexcept;
   void join_message(Phase& phase, double time_s) noexcept;
+  bool can_be_held(const SegmentVector& u) noexcept;
 };
 
 const Reference::State::Phase& Reference::State::at(double time_s, int& index) const noexcept {
@@ -239,6 +255,15 @@ void Reference::State::join_message(Phase& phase, double time_s) noexcept {
                    to.acceleration);
 }
 
+bool Reference::State::can_be_held(const SegmentVector& u) noexcept {
+  if (hold == nullptr) return true;
+  constexpr double kRounding = 1e-9;
+  hold->largest_bend(u, bend);
+  for (Eigen::Index i = 0; i < bend.size(); ++i)
+    if (u.segment<2>(2 * i).norm() > bend[i] + kRounding) return false;
+  return true;
+}
+
 Reference::Reference(const ReferenceSettings& settings, const ControllerSettings& control,
                      int segments)
     : Reference(settings, control, [&] {
@@ -301,6 +326,10 @@ Reference::Reference(const ReferenceSettings& settings, const ControllerSettings
       made.live = true;
       made.timeout_s = live->timeout_s;
     }
+    if (const auto* live = phase.kind.get_if<LiveTipReference>()) {
+      made.max_tip_speed_mps = live->max_speed_mps;
+      if (!state_->tip_search) state_->tip_search.emplace(arm, control.max_theta_rad, std::nullopt);
+    }
     made.peak_speed_radps = phase.kind.largest_speed_radps();
     made.join.resize(state_->dof);
     made.message.u.setZero(state_->dof);
@@ -312,6 +341,7 @@ Reference::Reference(const ReferenceSettings& settings, const ControllerSettings
     begin += phase.duration_s;
   }
   state_->zero.setZero(state_->dof);
+  state_->bend.setZero(segments);
   state_->offset.setZero(state_->dof);
   state_->offset_rate.setZero(state_->dof);
   resize(state_->from, state_->dof);
@@ -419,6 +449,7 @@ LiveVerdict Reference::receive(double time_s, ConstVectorRef u, ConstVectorRef v
       s.norm(s.offset_rate) > max_speed) {
     return LiveVerdict::out_of_limits;
   }
+  if (!s.can_be_held(s.to.u)) return LiveVerdict::not_held;
   const double local = time - phase.begin_s;
   s.curve(phase, local, s.from);
   s.offset = s.from.u - s.to.u;
@@ -426,6 +457,39 @@ LiveVerdict Reference::receive(double time_s, ConstVectorRef u, ConstVectorRef v
   s.join_message(phase, local);
   s.join_following(index);
   return LiveVerdict::accepted;
+}
+
+LiveVerdict Reference::receive_tip(double time_s, const Eigen::Vector3d& position_m,
+                                   const Eigen::Vector3d& velocity_mps) noexcept {
+  constexpr double kNearEnough = 0.01;  // of the arm's length: what the model is off by anyway
+  State& s = *state_;
+  const double time = time_s - s.start_s;
+  State::Phase& phase = s.phases[static_cast<std::size_t>(s.entered)];
+  if (!s.started || time < 0.0 || !phase.tracker || !phase.tracker->live())
+    return LiveVerdict::not_live;
+  if (!position_m.allFinite() || !velocity_mps.allFinite()) return LiveVerdict::not_finite;
+  if (velocity_mps.norm() > phase.max_tip_speed_mps) return LiveVerdict::out_of_limits;
+  const double near_m = kNearEnough * phase.tracker->reach_m();
+  if ((position_m - s.arm.base_position_m).norm() > phase.tracker->reach_m() + near_m)
+    return LiveVerdict::unreachable;
+  TipSearch& search = *s.tip_search;
+  search.begin(position_m, phase.tracker->u_rad());
+  for (const double part : {0.0, 0.3, 0.8, -0.3}) {
+    const int left = (kTipSearchSteps - search.steps()) / 2;
+    part == 0.0 ? search.search(phase.tracker->u_rad(), left) : search.search_from_arc(part, left);
+  }
+  if (search.distance_m() > near_m) return LiveVerdict::unreachable;
+  if (!s.can_be_held(search.u_rad())) return LiveVerdict::not_held;
+  phase.tracker->retarget(time, position_m, velocity_mps);
+  return LiveVerdict::accepted;
+}
+
+void Reference::hold_within(HoldLimits& limits) noexcept {
+  State& s = *state_;
+  s.hold = &limits;
+  if (s.tip_search) s.tip_search.emplace(s.arm, s.control.max_theta_rad, limits.plane_rad());
+  for (State::Phase& phase : s.phases)
+    if (phase.tracker) phase.tracker->hold_within(limits);
 }
 
 }  // namespace softarm

@@ -28,6 +28,8 @@ Registry<ReferenceKind>& reference_kinds() {
       PaperReference{},
       WayPointReference{},
       LiveReference{},
+      LiveTipReference{},
+      TableReference{},
       TipPathReference{.shape = TipPathShape::point},
       TipPathReference{.shape = TipPathShape::circle},
       TipPathReference{.shape = TipPathShape::lemniscate},

@@ -47,6 +47,7 @@ TaskSpaceTracker::TaskSpaceTracker(const ArmParameters& arm, const ControllerSet
     : arm_(arm),
       gains_(control.task_space),
       path_(path),
+      live_(path_.get_if<LiveTipReference>()),
       blend_s_(control.blend_s),
       max_theta_rad_(kThetaBound * control.max_theta_rad),
       max_speed_radps_(control.max_speed_radps),
@@ -62,7 +63,8 @@ TaskSpaceTracker::TaskSpaceTracker(const ArmParameters& arm, const ControllerSet
   if (arm_.extensible) weigh(natural_elongation_m);
   jacobian_.setZero(3, arm_.dof());
   jacobian_rate_.setZero(3, arm_.dof());
-  join_.resize(3);
+  for (Blend* blend : {&join_, &approach_, &stop_}) blend->resize(3);
+  largest_bend_.setZero(arm_.size());
   for (SegmentVector* v : {&blended_.u, &blended_.velocity, &blended_.acceleration}) v->setZero(3);
 }
 
@@ -90,8 +92,15 @@ void TaskSpaceTracker::start(double time_s, ConstVectorRef u, ConstVectorRef vel
   velocity_ = velocity;
   limited_ = false;
   jerk_.setZero();
-  const TipReference first = path_.tip(0.0);
   tip_jacobian(arm_, u_, jacobian_);
+  if (live()) {  // until a target comes the tip rests where it is
+    live_s_ = time_s;
+    live_m_ = tip_position(arm_, u_) + tip_offset_m;
+    live_mps_.setZero();
+    approach_.clear();
+    stop_.clear();
+  }
+  const TipReference first = path(time_s);
   const SegmentVector away = tip_position(arm_, u_) + tip_offset_m - first.position_m;
   const SegmentVector rate = jacobian_ * velocity_ - first.velocity_mps;
   join_.set(time_s, std::max(blend_s_, 1e-3), away, rate, -first.acceleration_mps2);
@@ -124,7 +133,7 @@ void TaskSpaceTracker::sample(double time_s, ReferenceSample& out) const noexcep
   out.has_polar = false;
   out.limited = limited_;
   out.has_tip = true;
-  out.tip = path_.tip(std::max(time_s - begin_s_, 0.0));
+  out.tip = path(std::max(time_s, begin_s_));
 }
 
 void TaskSpaceTracker::step(double duration_s) noexcept {
@@ -171,18 +180,58 @@ void TaskSpaceTracker::accelerate() noexcept {
   acceleration_ += posture_;
 }
 
+TipReference TaskSpaceTracker::path(double time_s) const noexcept {
+  if (!live()) return path_.tip(time_s - begin_s_);
+  const double age = std::max(time_s - live_s_, 0.0);
+  const bool goes_on = age < live_->timeout_s;
+  blended_.u = live_m_ + (goes_on ? age : live_->timeout_s + 0.5 * stop_s_) * live_mps_;
+  blended_.velocity.setZero();
+  blended_.acceleration.setZero();
+  if (goes_on) blended_.velocity = live_mps_;
+  if (!goes_on) stop_.add(time_s, blended_);
+  if (approach_.active(time_s)) approach_.add(time_s, blended_);
+  return {blended_.u, blended_.velocity, blended_.acceleration};
+}
+
+void TaskSpaceTracker::retarget(double time_s, const Eigen::Vector3d& position_m,
+                                const Eigen::Vector3d& velocity_mps) noexcept {
+  constexpr double kShortest_s = 0.05, kQuinticPeakAcceleration = 5.7735;
+  const TipReference now = path(time_s);
+  const SegmentVector away = now.position_m - position_m;
+  const SegmentVector rate = now.velocity_mps - velocity_mps;
+  const double speed =
+      std::max(live_->max_speed_mps - velocity_mps.norm(), 0.25 * live_->max_speed_mps);
+  const double acceleration = live_->max_acceleration_mps2;
+  const double duration =
+      std::max({kShortest_s, kQuinticPeakSpeed * away.norm() / speed,
+                std::sqrt(kQuinticPeakAcceleration * away.norm() / acceleration),
+                4.0 * rate.norm() / acceleration});
+  approach_.set(time_s, duration, away, rate, now.acceleration_mps2);
+  live_s_ = time_s;
+  live_m_ = position_m;
+  live_mps_ = velocity_mps;
+  // It comes to rest half as far on as it would have gone in that time: without turning back.
+  stop_s_ = std::max(kShortest_s, 4.0 * velocity_mps.norm() / acceleration);
+  const SegmentVector goes_on = velocity_mps, ahead = -0.5 * stop_s_ * velocity_mps;
+  stop_.set(time_s + live_->timeout_s, stop_s_, ahead, goes_on, SegmentVector::Zero(3));
+}
+
 // Changes u'' so that after `duration_s` neither |u'| nor, at the rate 2 lambda at which it may be
 // approached, theta is beyond its bound.
 void TaskSpaceTracker::bound(double duration_s) noexcept {
+  if (hold_ != nullptr) hold_->largest_bend(u_, largest_bend_);
   for (Eigen::Index i = 0; i < u_.size(); i += arm_.segment_dof()) {
     const Eigen::Vector2d u = u_.segment<2>(i), now = velocity_.segment<2>(i);
     const Eigen::Vector2d asked = now + duration_s * acceleration_.segment<2>(i);
     Eigen::Vector2d allowed = asked;
     const double theta = u.norm(), speed = asked.norm();
     if (speed > max_speed_radps_) allowed *= max_speed_radps_ / speed;
-    if (theta > 0.5 * max_theta_rad_) {
+    const double bend = hold_ != nullptr
+                            ? std::min(max_theta_rad_, kThetaBound * largest_bend_[i / 2])
+                            : max_theta_rad_;
+    if (theta > 0.5 * bend && theta > 0.0) {
       const double outward = allowed.dot(u) / theta;
-      const double most = 2.0 * gains_.lambda_1ps * (max_theta_rad_ - theta);
+      const double most = 2.0 * gains_.lambda_1ps * (bend - theta);
       if (outward > most) allowed -= (outward - most) / theta * u;
     }
     if (allowed == asked) continue;
@@ -193,7 +242,7 @@ void TaskSpaceTracker::bound(double duration_s) noexcept {
 
 // The path, joined from where the tip was at the start.
 TipReference TaskSpaceTracker::target(double time_s) noexcept {
-  TipReference out = path_.tip(time_s - begin_s_);
+  TipReference out = path(time_s);
   if (!join_.active(time_s)) return out;
   blended_.u = out.position_m;
   blended_.velocity = out.velocity_mps;

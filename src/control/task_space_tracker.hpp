@@ -55,6 +55,17 @@ class TaskSpaceTracker {
   void sample(double time_s, ReferenceSample& out) const noexcept;
 
   double time_s() const noexcept { return time_s_; }
+  const SegmentVector& u_rad() const noexcept { return u_; }
+  double reach_m() const noexcept { return reach_m_; }
+
+  /// Whether the path is a live target.
+  bool live() const noexcept { return live_ != nullptr; }
+  /// A new live target at `time_s`.
+  void retarget(double time_s, const Eigen::Vector3d& position_m,
+                const Eigen::Vector3d& velocity_mps) noexcept;
+
+  /// From now on theta of every segment also stays within what its chambers can hold.
+  void hold_within(HoldLimits& limits) noexcept { hold_ = &limits; }
 
   static constexpr int kMaxSteps = 20;
 
@@ -64,6 +75,7 @@ class TaskSpaceTracker {
   void step(double duration_s) noexcept;
   void bound(double duration_s) noexcept;
   TipReference target(double time_s) noexcept;
+  TipReference path(double time_s) const noexcept;
   TipReference from_base(TipReference path) const noexcept {
     path.position_m -= arm_.base_position_m;
     return path;
@@ -72,19 +84,26 @@ class TaskSpaceTracker {
   ArmParameters arm_;
   TaskSpaceSettings gains_;
   ReferenceKind path_;
+  const LiveTipReference* live_;  ///< of path_, where it is live
   double blend_s_, max_theta_rad_, max_speed_radps_, reach_m_;
 
   double begin_s_ = 0.0, time_s_ = 0.0;
   SegmentVector u_, velocity_, acceleration_, jerk_;
   bool limited_ = false;
   Blend join_;
+  // A live target: where it was sent to go, and what is left of where it was.
+  double live_s_ = 0.0, stop_s_ = 0.0;
+  Eigen::Vector3d live_m_ = Eigen::Vector3d::Zero(), live_mps_ = live_m_;
+  Blend approach_, stop_;
+  HoldLimits* hold_ = nullptr;
+  SegmentVector largest_bend_;
   TipOffset offset_;
   Eigen::Matrix3Xd jacobian_, jacobian_rate_;
   SegmentVector posture_;
   SegmentVector rest_;   ///< of the posture, where segments stretch; otherwise empty
   SegmentVector scale_;  ///< sqrt W, likewise
   double hard_mprad_;    ///< J is damped below
-  ReferenceSample blended_;
+  mutable ReferenceSample blended_;
 };
 
 }  // namespace softarm

@@ -7,7 +7,7 @@
 #include <limits>
 
 #include "recording/table_headers.hpp"
-#include "recording/table_text.hpp"
+#include "softarm/base/table_text.hpp"
 
 namespace softarm {
 namespace {

@@ -5,6 +5,7 @@
 #include <bit>
 #include <type_traits>
 
+#include "softarm/runtime/control_pipeline.hpp"
 #include "softarm/runtime/safety_monitor.hpp"
 
 namespace softarm {
@@ -136,14 +137,16 @@ std::vector<FieldDifference> differences(const controller_status_t& recorded,
                                          const controller_status_t& replayed) {
   const auto& [time_a, tick_a, frame_a, hash_a, seed_a, nonce_a, version_a, mode_a, reason_a,
                flags_a, age_a, accepted_a, rejected_a, refusal_a, repeated_a, missing_a, overruns_a,
-               malformed_a, segments_a, chambers_a, stretching_a, u_a, velocity_a, reference_a,
-               phi_a, theta_a, tau_a, twist_a, length_a, pressure_a, elongation_a,
-               elongation_rate_a, elongation_ref_a, axial_a] = recorded;
+               malformed_a, references_refused_a, law_answers_a, round_trip_a, segments_a,
+               chambers_a, stretching_a, u_a, velocity_a, reference_a, phi_a, theta_a, tau_a,
+               twist_a, length_a, pressure_a, elongation_a, elongation_rate_a, elongation_ref_a,
+               axial_a] = recorded;
   const auto& [time_b, tick_b, frame_b, hash_b, seed_b, nonce_b, version_b, mode_b, reason_b,
                flags_b, age_b, accepted_b, rejected_b, refusal_b, repeated_b, missing_b, overruns_b,
-               malformed_b, segments_b, chambers_b, stretching_b, u_b, velocity_b, reference_b,
-               phi_b, theta_b, tau_b, twist_b, length_b, pressure_b, elongation_b,
-               elongation_rate_b, elongation_ref_b, axial_b] = replayed;
+               malformed_b, references_refused_b, law_answers_b, round_trip_b, segments_b,
+               chambers_b, stretching_b, u_b, velocity_b, reference_b, phi_b, theta_b, tau_b,
+               twist_b, length_b, pressure_b, elongation_b, elongation_rate_b, elongation_ref_b,
+               axial_b] = replayed;
   Collector compare;
   compare("time_us", "us", time_a, time_b);
   compare("tick", "", tick_a, tick_b);
@@ -156,6 +159,17 @@ std::vector<FieldDifference> differences(const controller_status_t& recorded,
   compare("refusal", "", int{refusal_a}, int{refusal_b});
   compare("frames_repeated", "", repeated_a, repeated_b);
   compare("frames_missing", "", missing_a, missing_b);
+  // Those refused before the pipeline belong to the daemon.
+  for (int k = 1; k < kLiveVerdicts; ++k)
+    if (const auto why = static_cast<LiveVerdict>(k);
+        why != LiveVerdict::wrong_size && why != LiveVerdict::out_of_order)
+      compare("references_refused", "", references_refused_a[k], references_refused_b[k]);
+  for (int k = 0; k < kLawVerdicts; ++k)
+    if (const auto why = static_cast<LawVerdict>(k); why != LawVerdict::not_recent &&
+                                                     why != LawVerdict::out_of_order &&
+                                                     why != LawVerdict::wrong_size)
+      compare("law_answers", "", law_answers_a[k], law_answers_b[k]);
+  compare("law_round_trip_s", "s", round_trip_a, round_trip_b);
   compare("num_segments", "", segments_a, segments_b);
   compare("num_chambers", "", chambers_a, chambers_b);
   compare("num_stretching", "", stretching_a, stretching_b);

@@ -88,6 +88,8 @@ bool Replay::fits(const tick_record_t& record) const {
   return record.tick > 0 && sane(record.tick) && sane(record.first_ns) && sane(record.now_ns) &&
          record.pressure_bar.size() == chambers &&
          (record.dimension == 0 || record.dimension == dof) &&
+         (record.law_answer < 0 || (sane(record.law_state_ns) && sane(record.law_arrival_ns) &&
+                                    sane(record.law_validity_ns))) &&
          std::all_of(record.frames.begin(), record.frames.end(), frame_fits);
 }
 

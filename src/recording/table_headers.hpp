@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "recording/table_text.hpp"
+#include "softarm/base/table_text.hpp"
 #include "softarm/recording/csv_table.hpp"
 
 namespace softarm {

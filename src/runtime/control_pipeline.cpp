@@ -8,6 +8,7 @@
 #include "softarm/model/actuation_matrix.hpp"
 #include "softarm/runtime/elongation_reference.hpp"
 #include "softarm/runtime/settings.hpp"
+#include "softarm/runtime/static_hold.hpp"
 
 namespace softarm {
 namespace {
@@ -16,6 +17,25 @@ namespace {
 constexpr double kSoftLimitMargin = 1.1;
 /// A command that has moved by so much must move the arm, unless the poses are frozen.
 constexpr double kFrozenCommandChange_bar = 0.05;
+
+/// A force of an external law beyond so many times what the chambers of its segment give together
+/// is none of this arm: a wrong unit, or a law that diverges. What is below is scaled into reach.
+constexpr double kMostForce = 10.0;
+/// Pressures of an external law may be off the limits by rounding.
+constexpr double kPressureRounding = 1e-6;
+
+SegmentVector most_force_nm(const ActuationSettings& actuation) {
+  const double largest_bar =
+      std::max(std::abs(actuation.min_pressure_bar), std::abs(actuation.max_pressure_bar));
+  SegmentVector most(2 * std::ssize(actuation.segments));
+  for (Eigen::Index i = 0; i < most.size(); ++i) {
+    double gain = 0.0;
+    for (const Chamber& chamber : actuation.segments[static_cast<std::size_t>(i / 2)])
+      gain += chamber.gain_nm_per_bar;
+    most[i] = kMostForce * gain * largest_bar;
+  }
+  return most;
+}
 
 std::unique_ptr<ModelObserver> make_observer(const PipelineSettings& settings) {
   if (settings.estimation.observer != ObserverKind::model) return nullptr;
@@ -56,7 +76,13 @@ ControlPipeline::ControlPipeline(const PipelineSettings& settings)
       answer_ns_(safety_.thresholds().hold_after_ns + to_ns(settings.control.dead_time_s)),
       reference_(settings.reference, settings.control, settings.arm,
                  elongation(settings, settings.actuation.bias_pressure_bar)),
-      controller_(settings.arm, settings.control),
+      hold_(settings.arm.extensible
+                ? nullptr
+                : std::make_unique<StaticHold>(settings.arm, settings.actuation)),
+      law_(settings.control.law.make(
+          {settings.arm, settings.control, chamber_count(settings.actuation)})),
+      external_(dynamic_cast<ExternalLawInput*>(law_.get())),
+      most_force_nm_(most_force_nm(settings.actuation)),
       allocator_(settings.actuation, settings.arm.extensible),
       elongation_(settings.arm.extensible ? std::make_unique<ElongationReference>(
                                                 settings.arm, settings.actuation, allocator_)
@@ -73,8 +99,12 @@ ControlPipeline::ControlPipeline(const PipelineSettings& settings)
       previous_tau_nm_(SegmentVector::Zero(settings.arm.dof())),
       commanded_tau_nm_(previous_tau_nm_),
       pressure_at_last_motion_bar_(previous_bar_) {
+  if (hold_) reference_.hold_within(*hold_);
   seen_ns_.fill(kNever);
   if (observer_) measured_tau_nm_ = modelled_tau_nm_ = previous_tau_nm_;
+  control_.tau_u_nm.setZero(settings.arm.dof());
+  control_.tau_actuation_nm.setZero(settings.arm.dof());
+  control_.pressure_bar.setZero(allocator_.chambers());
   output_.pressure_bar = previous_bar_;
 }
 
@@ -93,6 +123,7 @@ const TickOutput& ControlPipeline::tick(const TickInput& input) noexcept {
   safety.command_expired = input.command_expired && ticked_;
   safety.paused = input.paused && ticked_;
   watch(input, safety);
+  if (external_ != nullptr) take_law(input, safety);
 
   const Mode before = safety_.mode();
   safety.activated_too_often = activation_limit_.reached(input.now_ns, safety_);
@@ -104,7 +135,8 @@ const TickOutput& ControlPipeline::tick(const TickInput& input) noexcept {
     const SegmentVector at_rest = SegmentVector::Zero(settings_.arm.dof());
     reference_.start(seconds(act_ns), output_.motion.u_rad, at_rest);
     if (elongation_) elongation_->start(seconds(act_ns), output_.motion.u_rad);
-    controller_.reset_integral();
+    law_->reset();
+    active_since_ns_ = input.now_ns;
     ++activations_;
   }
   take_reference(input);
@@ -116,6 +148,7 @@ const TickOutput& ControlPipeline::tick(const TickInput& input) noexcept {
     oscillation_watch_.reset();
   }
   limit(mode);
+  if (external_ != nullptr) view_for_law(mode, act_ns);
   if (observer_) {
     allocator_.torque(output_.pressure_bar, commanded_tau_nm_);
     observer_->command(input.now_ns, commanded_tau_nm_);
@@ -333,32 +366,117 @@ void ControlPipeline::expect(std::int64_t at_ns) noexcept {
   known_ = {window_.now.u, window_.now.velocity, window_.now.acceleration, activations_};
 }
 
+LawVerdict ControlPipeline::judge(const LawInput& law, std::int64_t now_ns) noexcept {
+  if (law.state_ns == kNever || law.state_ns > now_ns) return LawVerdict::not_recent;
+  const std::int64_t longest_ns = to_ns(settings_.safety.law_validity_s);
+  const std::int64_t validity_ns = std::clamp<std::int64_t>(law.validity_ns, 0, longest_ns);
+  if (now_ns - law.state_ns >= validity_ns) return LawVerdict::expired;
+  const ActuationSettings& actuation = settings_.actuation;
+  if (!law.values.allFinite()) return LawVerdict::not_finite;
+  if (law.answer == LawAnswer::pressures) {
+    const double rounding =
+        kPressureRounding * (actuation.max_pressure_bar - actuation.min_pressure_bar);
+    if (law.values.size() > 0 && (law.values.minCoeff() < actuation.min_pressure_bar - rounding ||
+                                  law.values.maxCoeff() > actuation.max_pressure_bar + rounding))
+      return LawVerdict::out_of_limits;
+  } else if (law.values.size() == most_force_nm_.size() &&
+             (law.values.array().abs() > most_force_nm_.array()).any()) {
+    return LawVerdict::out_of_limits;
+  }
+  const LawVerdict verdict = external_->take(law.answer, law.values);
+  if (verdict != LawVerdict::accepted) return verdict;
+  law_until_ns_ = law.state_ns + validity_ns;
+  output_.law_round_trip_s = to_seconds(law.arrival_ns - law.state_ns);
+  return LawVerdict::accepted;
+}
+
+void ControlPipeline::take_law(const TickInput& input, SafetyInput& safety) noexcept {
+  if (input.law != nullptr)
+    ++law_counts_[static_cast<std::size_t>(judge(*input.law, input.now_ns))];
+  safety.law_used = true;
+  safety.law_until_ns = law_until_ns_;
+}
+
+/// The answer comes for the next tick at the earliest, and acts in the middle of its period.
+void ControlPipeline::view_for_law(Mode mode, std::int64_t act_ns) noexcept {
+  output_.law = nullptr;
+  if (!output_.motion.all_valid()) return;
+  const bool active = mode == Mode::active;
+  const std::int64_t at_ns = act_ns + period_ns_;
+  if (active) {
+    const std::int64_t ahead_ns = output_.observer != nullptr ? delay_ns_ : 0;
+    reference_.sample(seconds(at_ns + ahead_ns), law_view_.reference);
+  }
+  if (output_.observer != nullptr) {
+    law_view_.u_rad = output_.motion.u_rad + period_s_ * output_.motion.velocity_radps;
+    law_view_.velocity_radps = output_.motion.velocity_radps;
+  } else {
+    const ReferenceSample& known = law_view_.reference;
+    known_ = {known.u, known.velocity, known.acceleration, activations_};
+    filter_.predict(at_ns, law_motion_, active ? &known_ : nullptr);
+    law_view_.u_rad = law_motion_.u_rad;
+    law_view_.velocity_radps = law_motion_.velocity_radps;
+  }
+  if (!active) {
+    law_view_.reference.u = law_view_.u_rad;
+    law_view_.reference.velocity.setZero(law_view_.u_rad.size());
+    law_view_.reference.acceleration.setZero(law_view_.u_rad.size());
+  }
+  law_view_.active_s = active ? to_seconds(at_ns - active_since_ns_) : 0.0;
+  output_.law = &law_view_;
+}
+
 void ControlPipeline::take_reference(const TickInput& input) noexcept {
   output_.reference_limited = false;
-  if (input.reference == nullptr || safety_.mode() != Mode::active) return;
-  const LiveVerdict verdict =
-      reference_.receive(seconds(input.now_ns), input.reference->u, input.reference->velocity,
-                         input.reference->acceleration);
-  output_.reference_limited = verdict != LiveVerdict::accepted && verdict != LiveVerdict::not_live;
+  if (safety_.mode() != Mode::active) return;
+  const double now_s = seconds(input.now_ns);
+  if (input.reference != nullptr)
+    note_reference(reference_.receive(now_s, input.reference->u, input.reference->velocity,
+                                      input.reference->acceleration));
+  if (input.tip_target != nullptr)
+    note_reference(reference_.receive_tip(now_s, input.tip_target->position_m,
+                                          input.tip_target->velocity_mps));
+}
+
+void ControlPipeline::note_reference(LiveVerdict verdict) noexcept {
+  ++reference_counts_[static_cast<std::size_t>(verdict)];
+  output_.reference_limited |= verdict != LiveVerdict::accepted && verdict != LiveVerdict::not_live;
 }
 
 void ControlPipeline::control(std::int64_t act_ns) noexcept {
   const std::int64_t ahead_ns = output_.observer != nullptr ? delay_ns_ : 0;
-  double lookahead_s = controller_.lookahead_s();
+  double lookahead_s = law_->lookahead_s();
   if (elongation_) lookahead_s = std::max(lookahead_s, ElongationReference::kLookahead_s);
   reference_.window(seconds(act_ns + ahead_ns), lookahead_s, window_);
   if (elongation_) elongation_->advance(seconds(act_ns + ahead_ns), lookahead_s, window_);
-  controller_.compute(output_.motion.u_rad, output_.motion.velocity_radps, window_, control_,
-                      correction());
+  const LawState state{output_.motion.u_rad, output_.motion.velocity_radps, correction()};
+  control_.answer = LawAnswer::force;
+  control_.bounded = false;
+  law_->compute(state, window_, control_);
   if (elongation_) elongation_->hold_constant_lengths(control_.tau_actuation_nm);
-  allocator_.allocate(control_.tau_actuation_nm, allocation_);
-  controller_.integrate(period_s_, output_.motion.u_rad, window_.now, allocation_.scale);
+  allocate();
+  law_->applied(period_s_, state, window_.now, allocation_.scale);
   if (ahead_ns > 0) reference_.sample(seconds(act_ns), window_.now);
   output_.reference = window_.now;
   output_.reference_limited |= window_.now.limited;
   output_.tau_actuation_nm = control_.tau_actuation_nm;
   output_.bounded = control_.bounded;
   output_.saturated = allocation_.saturated;
+}
+
+void ControlPipeline::allocate() noexcept {
+  if (control_.answer == LawAnswer::pressures) {
+    allocation_.pressures_bar = control_.pressure_bar;
+    allocation_.scale.setOnes(settings_.arm.size());
+    allocation_.saturated = false;
+    control_.tau_actuation_nm.resize(settings_.arm.dof());
+    allocator_.torque(control_.pressure_bar, control_.tau_actuation_nm);
+    return;
+  }
+  if (control_.answer == LawAnswer::force)
+    solve_actuation(settings_.arm, output_.motion.u_rad, control_.tau_u_nm,
+                    control_.tau_actuation_nm);
+  allocator_.allocate(control_.tau_actuation_nm, allocation_);
 }
 
 void ControlPipeline::limit(Mode mode) noexcept {

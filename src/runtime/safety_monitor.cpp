@@ -29,6 +29,7 @@ struct Evidence {
   std::int64_t measurement_age_ns;
   std::int64_t go_age_ns;
   std::int64_t foreign_age_ns;
+  std::int64_t law_overdue_ns;  ///< since the newest answer expired; negative while it is valid
 
   /// Pressure is commanded, or may be in the next tick.
   bool pressurised() const {
@@ -100,6 +101,10 @@ constexpr std::array kCauses{
           [](const Evidence& e) { return e.input.sender_restarted; }},
     Cause{{Reason::frames_stale, Mode::vent, Clearance::good_frames},
           [](const Evidence& e) { return e.frame_age_ns > e.thresholds.vent_after_ns; }},
+    Cause{{Reason::law_silent, Mode::vent, Clearance::good_frames},
+          [](const Evidence& e) {
+            return e.input.law_used && e.law_overdue_ns > e.thresholds.law_vent_after_ns;
+          }},
     Cause{{Reason::frame_period_mismatch, Mode::vent, Clearance::good_frames},
           [](const Evidence& e) { return e.input.frame_period_mismatch; }},
     Cause{{Reason::many_overruns, Mode::vent, Clearance::good_frames},
@@ -111,6 +116,8 @@ constexpr std::array kCauses{
           [](const Evidence& e) {
             return e.input.motion_unknown || e.frame_age_ns > e.thresholds.hold_after_ns;
           }},
+    Cause{{Reason::law_late, Mode::hold, Clearance::good_frames},
+          [](const Evidence& e) { return e.input.law_used && e.law_overdue_ns > 0; }},
     Cause{{Reason::poses_frozen, Mode::hold, Clearance::good_frames},
           [](const Evidence& e) { return e.input.poses_frozen; }},
     Cause{{Reason::contact, Mode::hold, Clearance::good_frames},
@@ -184,7 +191,9 @@ const char* name(Reason reason) noexcept {
                               "activated_too_often",
                               "wrong_model",
                               "contact",
-                              "contact_vented"};
+                              "contact_vented",
+                              "law_late",
+                              "law_silent"};
   static_assert(kNames.size() == static_cast<std::size_t>(kReasons));
   return name_of(reason, kNames);
 }
@@ -205,6 +214,7 @@ SafetyThresholds resolve_thresholds(const SafetySettings& settings,
           .vent_after_ns = to_ns(vent_s),
           .valve_silence_ns = to_ns(settings.valve_silence_s),
           .deadman_timeout_ns = to_ns(settings.deadman_timeout_s),
+          .law_vent_after_ns = to_ns(settings.law_vent_after_s),
           .arm_lapses_ns =
               to_ns(kArmLapses_s + 2.0 * settings.good_frames *
                                        std::max(settings.frame_period_s, control_period_s))};
@@ -242,7 +252,8 @@ CauseRule SafetyMonitor::worst_cause(const SafetyInput& input) const noexcept {
               ? kForever
               : input.now_ns - std::max(input.newest_measurement_ns, listening_since_ns_),
       .go_age_ns = age_ns(input.now_ns, input.newest_go_ns),
-      .foreign_age_ns = age_ns(input.now_ns, input.newest_foreign_ns)};
+      .foreign_age_ns = age_ns(input.now_ns, input.newest_foreign_ns),
+      .law_overdue_ns = age_ns(input.now_ns, input.law_until_ns)};
   for (const Cause& cause : kCauses)
     if (cause.present(evidence)) return named(cause.rule, input);
   return {Reason::none, Mode::active, Clearance::good_frames};

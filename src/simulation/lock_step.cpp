@@ -23,12 +23,17 @@ bool LockStep::step(LogRow& row, bool logged) {
   TickInput input;
   input.now_ns = now_ns;
   input.frames = frames_;
+  if (answered_) input.law = &answer_;
   operator_.attend(pipeline_.output(), input);
   measured_ = arm_.measured_pressures_bar().cast<float>().cast<double>();  // as valves publish them
   input.newest_measurement_ns = now_ns;
   input.measured_bar = &measured_;
   const TickOutput& output = pipeline_.tick(input);
   tick_times_.add_ns(monotonic_now_ns() - before_ns);
+
+  answered_ = external_ && output.law != nullptr && external_(output, answer_);
+  answer_.state_ns = now_ns;
+  answer_.arrival_ns = now_ns + pipeline_.period_ns();
 
   arm_.command(output.pressure_bar, validity_ns_, now_ns);
   if (logged) {

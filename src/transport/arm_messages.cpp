@@ -1,5 +1,6 @@
 #include "softarm/transport/arm_messages.hpp"
 
+#include <algorithm>
 #include <vector>
 
 #include "softarm/transport/message_decoding.hpp"
@@ -61,6 +62,9 @@ bool decode(std::span<const std::byte> bytes, ArmStatus& out) {
   out.frames_missing = message.frames_missing;
   out.overruns = message.overruns;
   out.messages_malformed = message.messages_malformed;
+  std::copy_n(message.references_refused, kLiveVerdicts, out.references_refused.begin());
+  std::copy_n(message.law_answers, kLawVerdicts, out.law_answers.begin());
+  out.law_round_trip_s = static_cast<double>(message.law_round_trip_s);
   flatten(message.u_rad, out.u_rad);
   flatten(message.velocity_radps, out.velocity_radps);
   flatten(message.reference_u_rad, out.reference_u_rad);
@@ -112,6 +116,23 @@ bool decode(std::span<const std::byte> bytes, ObserverStatus& out) {
        report.correction);
   take(message.stiffness_deviation, message.damping_deviation, message.gain_deviation,
        message.load_deviation, message.disturbance_deviation_nm, report.deviation);
+  return true;
+}
+
+bool decode(std::span<const std::byte> bytes, LawRequest& out) {
+  softarm_messages::law_state_t message;
+  if (!decode(bytes, message)) return false;
+  out.tick = message.tick;
+  out.time_us = message.time_us;
+  out.nonce = message.nonce;
+  out.mode = static_cast<Mode>(message.mode);
+  out.active_s = message.active_s;
+  copy(message.u_rad, out.u_rad);
+  copy(message.velocity_radps, out.velocity_radps);
+  copy(message.reference_u_rad, out.reference_u_rad);
+  copy(message.reference_velocity_radps, out.reference_velocity_radps);
+  copy(message.reference_acceleration_radps2, out.reference_acceleration_radps2);
+  copy(message.pressure_bar, out.pressure_bar);
   return true;
 }
 

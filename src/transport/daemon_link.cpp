@@ -52,6 +52,8 @@ DaemonLink::DaemonLink(const PipelineSettings& settings, const TransportSettings
   measurement_message_.pressure_bar.reserve(kMaxChambers);
   heard_pressures_.pressure_bar.reserve(kMaxChambers);
   heard_torques_.torque_nm.reserve(kMaxChambers);
+  law_message_.value.reserve(kMaxChambers);
+  law_.values.resize(0);
   measured_bar_.setZero(std::ssize(messages_.pressure_command.pressure_bar));
 
   mocap_.open(transport);
@@ -60,6 +62,15 @@ DaemonLink::DaemonLink(const PipelineSettings& settings, const TransportSettings
                     [this, k](const auto& packet) { take_frame(k, packet); });
   node_.subscribe(lcm_.reference_channel, kOtherCapacity,
                   [this](const auto& packet) { take_reference(packet); });
+  for (const ReferencePhase& phase : settings.reference.phases) {
+    if (phase.kind.get_if<LiveTipReference>() == nullptr) continue;
+    node_.subscribe(lcm_.tip_channel, kOtherCapacity,
+                    [this](const auto& packet) { take_tip_target(packet); });
+    break;
+  }
+  if (settings.control.law.get_if<ExternalLaw>() != nullptr)
+    node_.subscribe(lcm_.law_channel, kOtherCapacity,
+                    [this](const auto& packet) { take_law(packet); });
   node_.subscribe(lcm_.operator_channel, kRequestCapacity,
                   [this](const auto& packet) { take_operator(packet); });
   // Whether valves have vented is heard even where their pressures are not judged.
@@ -88,7 +99,7 @@ TickInput DaemonLink::collect(std::int64_t now_ns) noexcept {
   if (input_.paused) sent_us_ = kNever;  // its validity has passed, on whatever clock
   input_.command_expired = command_expired(now_ns / 1000);
   node_.drain(static_cast<int>(mocap_.channels().size()) * kFrameCapacity + 2 * kRequestCapacity +
-              3 * kOtherCapacity);
+              5 * kOtherCapacity);
   input_.requests.lost = requests_lost(previous_ns);
   // Of two inputs the one that is released is right; in a flood it may be the one not heard.
   if (released_ || goes_ >= kRequestCapacity) newest_go_ns_ = kNever;
@@ -127,13 +138,21 @@ void DaemonLink::receive_frames() noexcept {
 }
 
 void DaemonLink::take_reference(const ReceivedMessage& packet) noexcept {
-  if (!decode(packet.bytes, reference_message_) || reference_message_.dimension != dof_) {
+  const auto refuse = [this](LiveVerdict why) {
+    ++references_refused_[static_cast<std::size_t>(why)];
+  };
+  const bool decoded = decode(packet.bytes, reference_message_);
+  if (!decoded || reference_message_.dimension != dof_) {
     ++malformed_;
+    if (decoded) refuse(LiveVerdict::wrong_size);
     return;
   }
   const bool forgotten = age_ns(now_ns_, newest_reference_ns_) > kNumberForgotten_ns;
   if (reference_message_.sequence <= reference_sequence_ && !forgotten) {
-    if (reference_message_.sequence < reference_sequence_) ++backward_references_;
+    if (reference_message_.sequence < reference_sequence_) {
+      ++backward_references_;
+      refuse(LiveVerdict::out_of_order);
+    }
     return;
   }
   reference_sequence_ = reference_message_.sequence;
@@ -144,6 +163,52 @@ void DaemonLink::take_reference(const ReceivedMessage& packet) noexcept {
   reference_ = {vector(reference_message_.u_rad), vector(reference_message_.velocity_radps),
                 vector(reference_message_.acceleration_radps2)};
   input_.reference = &reference_;
+}
+
+void DaemonLink::take_tip_target(const ReceivedMessage& packet) noexcept {
+  if (!decode(packet.bytes, tip_message_)) {
+    ++malformed_;
+    return;
+  }
+  const bool forgotten = age_ns(now_ns_, newest_tip_ns_) > kNumberForgotten_ns;
+  if (tip_message_.sequence <= tip_sequence_ && !forgotten) {
+    if (tip_message_.sequence < tip_sequence_)
+      ++references_refused_[static_cast<std::size_t>(LiveVerdict::out_of_order)];
+    return;
+  }
+  tip_sequence_ = tip_message_.sequence;
+  newest_tip_ns_ = now_ns_;
+  tip_target_ = {Eigen::Map<const Eigen::Vector3d>(tip_message_.position_m),
+                 Eigen::Map<const Eigen::Vector3d>(tip_message_.velocity_mps)};
+  input_.tip_target = &tip_target_;
+}
+
+/// Its sequence and nonce; the rest is judged by the pipeline, so that a replay judges it again.
+void DaemonLink::take_law(const ReceivedMessage& packet) noexcept {
+  if (!decode(packet.bytes, law_message_)) {
+    ++malformed_;
+    return;
+  }
+  const auto& [sequence, nonce, validity_us, answer, count, value] = law_message_;
+  const auto refuse = [this](LawVerdict why) { ++law_refused_[static_cast<std::size_t>(why)]; };
+  if (!is_recent(nonce, kNever)) return refuse(LawVerdict::not_recent);
+  const bool forgotten = age_ns(now_ns_, newest_law_ns_) > kNumberForgotten_ns;
+  if (sequence <= law_sequence_ && !forgotten) return refuse(LawVerdict::out_of_order);
+  using Command = softarm_messages::law_command_t;
+  const auto expected = answer == Command::FORCE       ? dof_
+                        : answer == Command::PRESSURES ? std::ssize(messages_.status.pressure_bar)
+                                                       : -1;
+  if (count != expected) return refuse(LawVerdict::wrong_size);
+  law_sequence_ = sequence;
+  newest_law_ns_ = now_ns_;
+  law_.arrival_ns = arrival_ns(packet);
+  // The state is that of the daemon that commands the arm, on another clock than a shadow's.
+  const bool shadow = messages_.pressure_command.shadow != 0;
+  law_.state_ns = shadow ? law_.arrival_ns : 1000 * nonces_.instant_us(nonce);
+  law_.validity_ns = 1000 * std::int64_t{validity_us};
+  law_.answer = answer == Command::FORCE ? LawAnswer::force : LawAnswer::pressures;
+  law_.values = Eigen::Map<const Eigen::VectorXd>(value.data(), count);
+  input_.law = &law_;
 }
 
 /// Those who see the daemon that commands the arm may ask its shadow for the same: it moves nothing.
@@ -276,6 +341,15 @@ std::int32_t DaemonLink::held_us() const noexcept {
   return granted_us_ > 0 ? std::min(asked_us, granted_us_) : asked_us;
 }
 
+void DaemonLink::publish_law_state(std::int64_t now_ns, const TickOutput& output) noexcept {
+  if (output.law == nullptr || messages_.pressure_command.shadow != 0) return;
+  messages_.set_law_state(commands_, output);
+  auto& message = messages_.law_state;
+  message.time_us = now_ns / 1000;
+  message.nonce = nonces_.at(message.time_us);
+  if (!node_.publish(lcm_.law_state_channel, message)) ++unsent_;
+}
+
 void DaemonLink::publish_status(std::int64_t now_ns, const ControlPipeline& pipeline,
                                 const LoopTiming& timing) noexcept {
   messages_.set_status(timing.ticks, pipeline);
@@ -289,6 +363,16 @@ void DaemonLink::publish_status(std::int64_t now_ns, const ControlPipeline& pipe
   mode_ = mode;
   status.overruns = counter(timing.overruns);
   status.messages_malformed = counter(malformed_);
+  // These are refused before the pipeline.
+  for (const LiveVerdict why : {LiveVerdict::wrong_size, LiveVerdict::out_of_order}) {
+    const auto k = static_cast<std::size_t>(why);
+    status.references_refused[k] += counter(references_refused_[k]);
+  }
+  for (const LawVerdict why :
+       {LawVerdict::not_recent, LawVerdict::out_of_order, LawVerdict::wrong_size}) {
+    const auto k = static_cast<std::size_t>(why);
+    status.law_answers[k] += counter(law_refused_[k]);
+  }
   if (!node_.publish(lcm_.status_channel, status)) ++unsent_;
   if (!messages_.set_observer(timing.ticks, pipeline)) return;
   messages_.observer.time_us = status.time_us;

@@ -60,10 +60,13 @@ void DaemonLoop::tick(std::int64_t woken_ns, bool stopping) noexcept {
   const TickOutput& output = pipeline_.tick(input);
   const std::int64_t decided_ns = monotonic_now_ns();
   link_.publish_command(decided_ns, output);
+  link_.publish_law_state(woken_ns, output);
   ++timing_.ticks;
   link_.publish_status(woken_ns, pipeline_, timing_);
   link_.publish_record(input, output);
   if (timing_.ticks % ticks_per_second_ == 0) link_.publish_timing(woken_ns, timing_);
+  if (input.law != nullptr)
+    timing_.law.add_ns(std::max<std::int64_t>(input.law->arrival_ns - input.law->state_ns, 0));
   timing_.tick.add_ns(decided_ns - woken_ns);
   timing_.publish.add_ns(monotonic_now_ns() - decided_ns);
   if (output.frame_age_s >= 0.0) timing_.frame_age.add_ns(to_ns(output.frame_age_s));

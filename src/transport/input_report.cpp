@@ -44,6 +44,37 @@ std::string_view InputReport::refusals(std::int64_t now_ns, const Counts& counts
   return text;
 }
 
+template <class Verdict, int verdicts>
+std::string_view InputReport::refused(std::int64_t now_ns, const char* what,
+                                      const VerdictCounts<verdicts>& now,
+                                      Refused<verdicts>& last) noexcept {
+  if (last.reported_ns == kNever) last.reported_ns = now_ns;
+  if (now_ns - last.reported_ns < kSecond_ns) return {};
+  last.reported_ns = now_ns;
+  char* end = text_.data();
+  char* const limit = text_.data() + text_.size();
+  for (std::size_t k = 1; k < now.size(); ++k) {  // 0: accepted
+    const std::int64_t count = now[k] - last.before[k];
+    if (count == 0) continue;
+    end = fmt::format_to_n(end, static_cast<std::size_t>(limit - end), FMT_STRING("{} {} {}"),
+                           end == text_.data() ? what : ",", count, name(static_cast<Verdict>(k)))
+              .out;
+  }
+  last.before = now;
+  return {text_.data(), static_cast<std::size_t>(end - text_.data())};
+}
+
+std::string_view InputReport::refused_references(std::int64_t now_ns,
+                                                 const Counts& counts) noexcept {
+  return refused<LiveVerdict, kLiveVerdicts>(
+      now_ns, "live references refused in a second:", counts.live, live_);
+}
+
+std::string_view InputReport::refused_answers(std::int64_t now_ns, const Counts& counts) noexcept {
+  return refused<LawVerdict, kLawVerdicts>(
+      now_ns, "answers of the law refused in a second:", counts.answers, answers_);
+}
+
 std::string_view InputReport::backward(std::int64_t now_ns, const Backward& now,
                                        std::int64_t tolerated, Window& window) noexcept {
   if (window.begin_ns == kNever) window = {now_ns, now.count, false};

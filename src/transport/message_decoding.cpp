@@ -108,7 +108,7 @@ bool decode(std::span<const std::byte> bytes,
   const std::int64_t version = length32_at(bytes, kHash + kBeforeVersion);
   if (!text_at(bytes, kHash + kBeforeVersion + 4, version)) return false;
   const std::size_t counts =
-      kHash + kBeforeVersion + 4 + static_cast<std::size_t>(version) + 4 + 4 + 6 * 4 + 1;
+      kHash + kBeforeVersion + 4 + static_cast<std::size_t>(version) + 4 + 4 + 6 * 4 + 1 + 19 * 4;
   const int segments = bounded(length16_at(bytes, counts), kMaxSegments);
   const int chambers = bounded(length16_at(bytes, counts + 2), kMaxChambers);
   const int stretching = length16_at(bytes, counts + 4);
@@ -119,6 +119,25 @@ bool decode(std::span<const std::byte> bytes,
                             4 * static_cast<std::size_t>(chambers) +
                             4 * 4 * static_cast<std::size_t>(stretching),
                         message);
+}
+
+bool decode(std::span<const std::byte> bytes, softarm_messages::tip_target_t& message) noexcept {
+  return decode_exactly(bytes, kHash + 7 * 8, message);
+}
+
+bool decode(std::span<const std::byte> bytes, softarm_messages::law_state_t& message) noexcept {
+  constexpr std::size_t kFixed = 3 * 8 + 1 + 8;
+  const int dimension = bounded(length16_at(bytes, kHash + kFixed), 2 * kMaxSegments);
+  const int chambers = bounded(length16_at(bytes, kHash + kFixed + 2), kMaxChambers);
+  if (dimension < 0 || chambers < 0) return false;
+  return decode_exactly(bytes,
+                        kHash + kFixed + 4 + 5 * 8 * static_cast<std::size_t>(dimension) +
+                            4 * static_cast<std::size_t>(chambers),
+                        message);
+}
+
+bool decode(std::span<const std::byte> bytes, softarm_messages::law_command_t& message) noexcept {
+  return decode_list(bytes, 8 + 8 + 4 + 1, 8, kMaxChambers, message);
 }
 
 bool decode(std::span<const std::byte> bytes, softarm_messages::plant_state_t& message) noexcept {
@@ -144,14 +163,17 @@ bool decode(std::span<const std::byte> bytes,
 }
 
 bool decode(std::span<const std::byte> bytes, softarm_messages::tick_record_t& message) noexcept {
-  constexpr std::size_t kCounts = kHash + 7 * 8 + 4 + 8;  // numbers and flags come first
+  constexpr std::size_t kCounts = kHash + 10 * 8 + 4 + 9;  // numbers and flags come first
   const int chambers = bounded(length16_at(bytes, kCounts), kMaxChambers);
   const int dimension = bounded(length16_at(bytes, kCounts + 2), 2 * kMaxSegments);
   const int frames = bounded(length16_at(bytes, kCounts + 4), TickRecorder::kMostFrames);
   const int measured = bounded(length16_at(bytes, kCounts + 6), kMaxChambers);
-  if (chambers < 0 || dimension < 0 || frames < 0 || measured < 0) return false;
-  std::size_t at = kCounts + 8 + 4 * static_cast<std::size_t>(measured) +
-                   8 * static_cast<std::size_t>(chambers + 3 * dimension);
+  const int law = bounded(length16_at(bytes, kCounts + 8), kMaxChambers);
+  const int tip = length16_at(bytes, kCounts + 10);
+  if (chambers < 0 || dimension < 0 || frames < 0 || measured < 0 || law < 0) return false;
+  if (tip != 0 && tip != 6) return false;
+  std::size_t at = kCounts + 12 + 4 * static_cast<std::size_t>(measured) +
+                   8 * static_cast<std::size_t>(chambers + 3 * dimension + law + tip);
   for (int k = 0; k < frames; ++k) {
     const int bodies = bounded(length16_at(bytes, at + 2 * 8), kMaxBodies);
     if (bodies < 1) return false;

@@ -56,6 +56,7 @@ OutputMessages::OutputMessages(const PipelineSettings& settings, const Provenanc
     : pressure_command{},
       torque_command{},
       status{},
+      law_state{},
       observer{},
       width_(settings.arm.segment_dof()),
       by_torque_(settings.actuation.kind == ActuationKind::torque) {
@@ -84,6 +85,12 @@ OutputMessages::OutputMessages(const PipelineSettings& settings, const Provenanc
        {&status.phi_rad, &status.theta_rad, &status.residual_twist_rad, &status.residual_length_m})
     list->assign(segments, 0.0F);
   status.pressure_bar.assign(chambers, 0.0F);
+  law_state.dimension = static_cast<std::int16_t>(settings.arm.dof());
+  law_state.num_chambers = status.num_chambers;
+  for (auto* list : {&law_state.u_rad, &law_state.velocity_radps, &law_state.reference_u_rad,
+                     &law_state.reference_velocity_radps, &law_state.reference_acceleration_radps2})
+    list->resize(static_cast<std::size_t>(settings.arm.dof()));
+  law_state.pressure_bar.assign(chambers, 0.0F);
   if (settings.arm.extensible) {
     status.num_stretching = status.num_segments;
     for (auto* list : {&status.elongation_m, &status.elongation_rate_mps,
@@ -111,6 +118,23 @@ void OutputMessages::set_command(std::int64_t tick, const TickOutput& output) no
               torque_command.torque_nm.begin());
 }
 
+void OutputMessages::set_law_state(std::int64_t tick, const TickOutput& output) noexcept {
+  law_state.tick = tick;
+  law_state.mode = static_cast<std::int8_t>(output.mode);
+  law_state.active_s = output.law->active_s;
+  const auto put = [](const SegmentVector& from, std::vector<double>& to) {
+    std::copy(from.begin(), from.end(), to.begin());
+  };
+  put(output.law->u_rad, law_state.u_rad);
+  put(output.law->velocity_radps, law_state.velocity_radps);
+  put(output.law->reference.u, law_state.reference_u_rad);
+  put(output.law->reference.velocity, law_state.reference_velocity_radps);
+  put(output.law->reference.acceleration, law_state.reference_acceleration_radps2);
+  std::transform(output.pressure_bar.begin(), output.pressure_bar.end(),
+                 law_state.pressure_bar.begin(),
+                 [](double bar) { return static_cast<float>(bar); });
+}
+
 void OutputMessages::set_status(std::int64_t tick, const ControlPipeline& pipeline) noexcept {
   const TickOutput& output = pipeline.output();
   const FrameCounters& frames = pipeline.counters();
@@ -126,6 +150,12 @@ void OutputMessages::set_status(std::int64_t tick, const ControlPipeline& pipeli
   status.refusal = static_cast<std::int8_t>(output.refusal);
   status.frames_repeated = counter(frames.repeated);
   status.frames_missing = counter(frames.missing);
+  // Entry 0 stays 0: accepted references are not refused.
+  std::transform(pipeline.reference_counts().begin() + 1, pipeline.reference_counts().end(),
+                 status.references_refused + 1, counter);
+  std::transform(pipeline.law_counts().begin(), pipeline.law_counts().end(), status.law_answers,
+                 counter);
+  status.law_round_trip_s = static_cast<float>(output.law_round_trip_s);
   put_pairs(output.motion.u_rad, width_, status.u_rad);
   put_pairs(output.motion.velocity_radps, width_, status.velocity_radps);
   put_pairs(output.reference.u, width_, status.reference_u_rad);

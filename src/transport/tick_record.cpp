@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <softarm_messages/law_command_t.hpp>
 
 #include "softarm/base/hash.hpp"
 #include "softarm/runtime/settings.hpp"
@@ -10,6 +11,7 @@
 namespace softarm {
 namespace {
 
+using softarm_messages::law_command_t;
 using softarm_messages::tick_frame_t;
 using softarm_messages::tick_record_t;
 
@@ -25,7 +27,8 @@ void grow_to(std::vector<double>& list, std::size_t size) {
   if (list.size() < size) list.resize(size);
 }
 
-void put(const SegmentVector& from, std::vector<double>& to) {
+template <class Vector>
+void put(const Vector& from, std::vector<double>& to) {
   grow_to(to, static_cast<std::size_t>(from.size()));
   std::copy(from.begin(), from.end(), to.begin());
 }
@@ -79,6 +82,12 @@ tick_record_t largest_record(const PipelineSettings& settings, const std::string
   record.dimension = static_cast<std::int16_t>(dof);
   for (auto* list : {&record.u_rad, &record.velocity_radps, &record.acceleration_radps2})
     list->resize(dof);
+  record.num_tip = 6;
+  record.tip_target.resize(6);
+  if (settings.control.law.get_if<ExternalLaw>() != nullptr) {
+    record.law_value.resize(std::max(dof, chambers));
+    record.num_law = static_cast<std::int16_t>(record.law_value.size());
+  }
   record.build = build;
   tick_frame_t frame{};
   put(MocapFrame{.segments = settings.arm.size(), .body = {}}, frame);
@@ -104,7 +113,8 @@ void to_record(const TickInput& input, tick_record_t& record) {
   // A new field of TickInput breaks the build here: it must be added to lcmtypes/tick_record_t.lcm,
   // to this function, to RecordedInput::from and to the size that decode() checks.
   const auto& [now_ns, frames, reference, requests, command_expired, paused, consecutive_overruns,
-               newest_measurement_ns, measured_bar, newest_go_ns, newest_foreign_ns] = input;
+               newest_measurement_ns, tip_target, law, measured_bar, newest_go_ns,
+               newest_foreign_ns] = input;
   const auto& [arm, disarm, emergency_stop, shutdown, lost] = requests;
   record.now_ns = now_ns;
   record.num_frames = static_cast<std::int16_t>(frames.size());
@@ -129,6 +139,27 @@ void to_record(const TickInput& input, tick_record_t& record) {
   record.newest_measurement_ns = newest_measurement_ns;
   record.newest_go_ns = newest_go_ns;
   record.newest_foreign_ns = newest_foreign_ns;
+  record.num_tip = 0;
+  if (tip_target != nullptr) {
+    const auto& [position_m, velocity_mps] = *tip_target;
+    record.num_tip = 6;
+    grow_to(record.tip_target, 6);
+    std::copy(position_m.begin(), position_m.end(), record.tip_target.begin());
+    std::copy(velocity_mps.begin(), velocity_mps.end(), record.tip_target.begin() + 3);
+  }
+  record.law_answer = -1;
+  record.num_law = 0;
+  record.law_state_ns = record.law_arrival_ns = record.law_validity_ns = 0;
+  if (law != nullptr) {
+    const auto& [state_ns, arrival_ns, validity_ns, answer, values] = *law;
+    record.law_state_ns = state_ns;
+    record.law_arrival_ns = arrival_ns;
+    record.law_validity_ns = validity_ns;
+    record.law_answer =
+        answer == LawAnswer::pressures ? law_command_t::PRESSURES : law_command_t::FORCE;
+    record.num_law = static_cast<std::int16_t>(values.size());
+    put(values, record.law_value);
+  }
   record.num_measured = 0;
   if (measured_bar != nullptr) {
     record.num_measured = static_cast<std::int16_t>(measured_bar->size());
@@ -163,6 +194,17 @@ const TickInput& RecordedInput::from(const tick_record_t& record) {
   input_.newest_measurement_ns = record.newest_measurement_ns;
   input_.newest_go_ns = record.newest_go_ns;
   input_.newest_foreign_ns = record.newest_foreign_ns;
+  if (record.num_tip == 6) {
+    tip_target_ = {Eigen::Map<const Eigen::Vector3d>(record.tip_target.data()),
+                   Eigen::Map<const Eigen::Vector3d>(record.tip_target.data() + 3)};
+    input_.tip_target = &tip_target_;
+  }
+  if (record.law_answer >= 0) {
+    law_ = {record.law_state_ns, record.law_arrival_ns, record.law_validity_ns,
+            record.law_answer == law_command_t::PRESSURES ? LawAnswer::pressures : LawAnswer::force,
+            Eigen::Map<const Eigen::VectorXd>(record.law_value.data(), record.num_law)};
+    input_.law = &law_;
+  }
   if (record.num_measured > 0) {
     measured_bar_ =
         Eigen::Map<const Eigen::VectorXf>(record.measured_bar.data(), record.num_measured)

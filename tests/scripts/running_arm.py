@@ -43,7 +43,7 @@ def own_url():
 
 
 # A machine that is busy with other things must look like nothing else.
-SAFETY = "hold_after_s: 0.1, vent_after_s: 0.25, max_latency_s: 0.2"
+SAFETY = "hold_after_s: 0.1, vent_after_s: 0.25, max_latency_s: 0.2, law_validity_s: 0.3, law_vent_after_s: 0.3"
 
 
 def write_config(folder, base, url, more="", name=None, safety=SAFETY, daemon=""):

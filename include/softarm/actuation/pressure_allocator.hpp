@@ -10,16 +10,10 @@
 
 #include "softarm/actuation/settings.hpp"
 #include "softarm/model/arm.hpp"
+#include "softarm/model/chambers.hpp"
 #include "softarm/model/coordinates.hpp"
 
 namespace softarm {
-
-inline constexpr int kMaxChambersPerSegment = 8;
-inline constexpr int kMaxChambers = kMaxChambersPerSegment * kMaxSegments;
-
-/// One pressure per chamber (bar), segment by segment in the order of the valves. Storage in place:
-/// never allocates.
-using PressureVector = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, kMaxChambers, 1>;
 
 /// The chambers of one segment: which tau_A they can reach, and the pressures that give it.
 /// `Dimension` is the number of torque components: two, or one in the plane of a planar arm.
@@ -170,6 +164,10 @@ class PressureAllocator {
   /// 1 for which s tau is reachable within the pressure limits, then the pressures nearest the bias
   /// that give exactly s tau. No slew limit. Where segments stretch, 3n: as AxialChamberMap.
   void allocate(ConstVectorRef tau_actuation_nm, Allocation& out) const noexcept;
+
+  /// scale: n, the largest s <= 1 of every segment for which s tau is reachable, without the
+  /// pressures that give it.
+  void largest_scale(ConstVectorRef tau_actuation_nm, SegmentScalars& scale) const noexcept;
 
   /// tau_A (2n, N m) that pressures (all chambers, bar) give.
   void torque(ConstVectorRef pressures_bar, VectorRef tau_actuation_nm) const noexcept;

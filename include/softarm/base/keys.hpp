@@ -13,6 +13,7 @@
 
 #include <Eigen/Core>
 #include <algorithm>
+#include <filesystem>
 #include <functional>
 #include <optional>
 #include <string>
@@ -56,6 +57,11 @@ class Keys {
 
   /// Whether variables are being filled: then defaults may follow what was read before.
   virtual bool reading() const = 0;
+  /// A path that the key before it names relative to the file in which that stands.
+  virtual std::filesystem::path beside(const char* key, const std::filesystem::path& path) const {
+    static_cast<void>(key);
+    return path;
+  }
 
   /// A number, optional number, enum, Vector3d, rotation, or vector of numbers.
   template <typename T>

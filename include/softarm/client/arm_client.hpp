@@ -102,6 +102,26 @@ class ArmClient : public OperatorClient {
   void send_reference(ConstVectorRef u_rad, ConstVectorRef velocity_radps,
                       ConstVectorRef acceleration_radps2);
 
+  /// Sends a target of the tip (world frame, m and m/s) for a phase of kind live_tip. Does not
+  /// block. @throws std::invalid_argument for a number that is not finite; TransportError
+  void send_tip_target(const Eigen::Vector3d& position_m,
+                       const Eigen::Vector3d& velocity_mps = Eigen::Vector3d::Zero());
+
+  // A control law of one's own, for a softarmd with control.law: external.
+
+  /// What the law is to answer, the newest.
+  const std::optional<LawRequest>& law_request() const;
+  /// Sets the callback for every one of them.
+  void on_law_request(std::function<void(const LawRequest&)> callback);
+  /// Answers it: with a generalized force in u (2n, N m), or with set points of all chambers (bar).
+  /// The daemon holds an answer for `validity_s` from the state that it answers, at most for
+  /// daemon.safety.law_validity_s; without a newer one it goes to HOLD and then to VENT. What it
+  /// refused, and why, is in status()->law_answers. Does not block.
+  /// @throws std::invalid_argument for a wrong size or a number that is not finite; TransportError
+  void answer_force(const LawRequest& request, ConstVectorRef force_nm, double validity_s = 0.05);
+  void answer_pressures(const LawRequest& request, ConstVectorRef pressure_bar,
+                        double validity_s = 0.05);
+
   // Commands to the chambers, in place of softarmd.
 
   /// Takes the lock on the command channel of this machine, which softarmd also takes, until the
@@ -141,6 +161,8 @@ class ArmClient : public OperatorClient {
  private:
   void after_round() override;
   void send_command();
+  void answer(const LawRequest& request, std::int8_t answer, ConstVectorRef values, int expected,
+              double validity_s);
 
   struct State;
   std::unique_ptr<State> state_;

@@ -74,6 +74,7 @@ class ConfigKeys final : public Keys {
                        const std::string& got) const;
 
   bool reading() const override { return purpose_ == Purpose::read; }
+  std::filesystem::path beside(const char* key, const std::filesystem::path& path) const override;
   void section(const Key& key, const Body& body) override;
   void when(bool condition, const Body& body) override;
   void either(const char* exact, const Body& exact_body, const char* friendly,

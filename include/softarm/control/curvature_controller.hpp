@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "softarm/control/control_law.hpp"
 #include "softarm/control/reference.hpp"
 #include "softarm/control/settings.hpp"
 #include "softarm/model/arm.hpp"
@@ -11,16 +12,6 @@
 #include "softarm/model/model_correction.hpp"
 
 namespace softarm {
-
-/// What the controller asks of the actuation: 2n numbers each; 3n, with the axial force (N) as every
-/// third, where segments stretch.
-struct ControlOutput {
-  SegmentVector tau_u_nm;  ///< generalized force in u (N m)
-  SegmentVector
-      tau_actuation_nm;  ///< tau_A = A^-1 tau_u, (tau_x, tau_y) about the local axes (N m)
-  bool bounded = false;  ///< near a singularity (sin theta = 0 of A_couple, theta = 0 in polar)
-                         ///< something was bounded
-};
 
 /// (17) in u,
 ///   tau = G(u) + C(u,u') u'_ref + B(u) u''_ref + K u_ref + K_P (u_ref - u) + D u'_ref + K_D

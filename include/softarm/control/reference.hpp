@@ -11,29 +11,28 @@
 
 #include <memory>
 
+#include "softarm/control/hold_limits.hpp"
 #include "softarm/control/settings.hpp"
 #include "softarm/model/arm.hpp"
 #include "softarm/model/coordinates.hpp"
 
 namespace softarm {
 
-/// A reference now and a little before and after, for the derivative that inverts the valve lag.
-struct ReferenceWindow {
-  ReferenceSample now;
-  ReferenceSample before;
-  ReferenceSample after;
-  double interval_s = 0.0;  ///< time from `before` to `after`; 0: only `now` is filled in
-};
-
-/// What became of a live reference.
-enum class LiveVerdict {
+/// What became of a live reference. The numbers go over the wire.
+enum class LiveVerdict : std::int8_t {
   accepted,
   not_live,    ///< the phase of this time does not listen
   wrong_size,  ///< not 2n numbers
   not_finite,
-  out_of_limits,  ///< beyond max_theta_rad or max_speed_radps
-  step_too_large  ///< further than max_step_rad from the reference so far
+  out_of_limits,   ///< beyond max_theta_rad or max_speed_radps
+  step_too_large,  ///< further than max_step_rad from the reference so far
+  out_of_order,    ///< its sequence is below that of the newest
+  unreachable,     ///< no pose within max_theta_rad was found that brings the tip there
+  not_held         ///< the chambers cannot hold the arm there at rest
 };
+inline constexpr int kLiveVerdicts = static_cast<int>(LiveVerdict::not_held) + 1;
+/// "accepted", "not_live", ...; "unknown" for a value outside the enumeration.
+const char* name(LiveVerdict verdict) noexcept;
 
 /// Largest theta that a reference reaches, live ones apart (0).
 double largest_theta_rad(const ReferenceSettings& settings) noexcept;
@@ -96,6 +95,19 @@ class Reference {
   /// u and rests there.
   LiveVerdict receive(double time_s, ConstVectorRef u, ConstVectorRef velocity,
                       ConstVectorRef acceleration) noexcept;
+
+  /// A live target of the tip arrived (world frame), for a phase of kind live_tip. It is approached
+  /// from where the target was, within the speed and acceleration of the phase, and carried on with
+  /// its velocity for `timeout_s`; then it rests. Refused where no pose is found that reaches it
+  /// (kTipSearchSteps steps of a search, from the reference's own pose first).
+  LiveVerdict receive_tip(double time_s, const Eigen::Vector3d& position_m,
+                          const Eigen::Vector3d& velocity_mps) noexcept;
+
+  /// From now on live references stay where the chambers can hold the arm, and so do u_ref of
+  /// phases in task space: they do not wind up where pressures saturate. `limits` must outlive this.
+  void hold_within(HoldLimits& limits) noexcept;
+
+  static constexpr int kTipSearchSteps = 60;
 
  private:
   struct State;

@@ -43,6 +43,14 @@ struct ReferenceSample {
   TipReference tip;
 };
 
+/// A reference now and a little before and after, for the derivative that inverts the valve lag.
+struct ReferenceWindow {
+  ReferenceSample now;
+  ReferenceSample before;
+  ReferenceSample after;
+  double interval_s = 0.0;  ///< time from `before` to `after`; 0: only `now` is filled in
+};
+
 /// What is wrong with a phase of a reference. what() is "reference[1].points[2].time_s: expected X,
 /// got Y", with the key that an experiment has there.
 class ReferenceError : public std::invalid_argument {
@@ -68,7 +76,8 @@ struct ReferencePlace {
 
 struct ControllerSettings;
 
-/// What every kind has. `check` throws ReferenceError for settings that do not fit the limits or an
+/// What every kind has. A kind that is a path of the tip or not as its settings say has both sets of
+/// functions and `bool is_tip_path() const noexcept`. `check` throws ReferenceError for settings that do not fit the limits or an
 /// arm of so many segments.
 template <class K>
 concept AnyReference = requires(const K& kind, const ReferencePlace& place,
@@ -166,7 +175,10 @@ class ReferenceKind : public NamedKind<ReferenceInterface> {
     void evaluate(double time_s, ReferenceSample& out) const noexcept override {
       if constexpr (CurvatureReference<K>) value.evaluate(time_s, out);
     }
-    bool is_tip_path() const noexcept override { return TipReferencePath<K>; }
+    bool is_tip_path() const noexcept override {
+      if constexpr (requires { value.is_tip_path(); }) return value.is_tip_path();
+      return TipReferencePath<K>;
+    }
     TipReference tip(double time_s) const noexcept override {
       if constexpr (TipReferencePath<K>) return value.tip(time_s);
       return {};

@@ -3,6 +3,8 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <filesystem>
+#include <memory>
 #include <numbers>
 #include <string>
 #include <vector>
@@ -70,6 +72,49 @@ struct LiveReference {
   const char* name() const noexcept { return "live"; }
   void describe(Keys& key);
   void check(const ReferencePlace& place, const ControllerSettings& control, int segments) const;
+};
+
+/// Targets of the tip received over LCM, followed by (21); until one arrives, the tip stays.
+struct LiveTipReference {
+  double timeout_s = 0.2;
+  double max_speed_mps = 0.2;
+  double max_acceleration_mps2 = 1.0;
+
+  const char* name() const noexcept { return "live_tip"; }
+  void describe(Keys& key);
+  void check(const ReferencePlace& place, const ControllerSettings& control, int segments) const;
+  TipReference tip(double) const noexcept { return {}; }  ///< the tracker knows it
+};
+
+class TableCurve;
+
+/// A table of times and of u, of phi and theta, or of the tip: a cubic spline through its points,
+/// twice continuously differentiable, at rest at both ends; periodic where it repeats.
+class TableReference {
+ public:
+  std::string file;  ///< CSV, relative to the file that names it
+  bool repeat = false;
+  double max_acceleration_radps2 = 500.0;
+  double max_tip_speed_mps = 1.0;
+  double max_tip_acceleration_mps2 = 20.0;
+  std::string digest;  ///< of the table's numbers
+
+  const char* name() const noexcept { return "table"; }
+  void describe(Keys& key);
+  /// Reads the table. What is wrong with it is reported by check().
+  void load(const std::filesystem::path& path, int segments);
+  void check(const ReferencePlace& place, const ControllerSettings& control, int segments) const;
+  double largest_theta_rad() const noexcept;
+  double largest_speed_radps() const noexcept;
+  void evaluate(double time_s, ReferenceSample& out) const noexcept;
+  bool is_tip_path() const noexcept;
+  TipReference tip(double time_s) const noexcept;
+  /// Time of the last point, from the first; 0 without a table.
+  double duration_s() const noexcept;
+
+ private:
+  std::shared_ptr<const TableCurve> curve_;
+  std::string fault_;
 };
 
 /// Path p_d(t) of the tip in the world.

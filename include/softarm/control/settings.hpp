@@ -6,6 +6,7 @@
 #include <optional>
 #include <vector>
 
+#include "softarm/control/control_law.hpp"
 #include "softarm/control/reference_kinds.hpp"
 #include "softarm/model/arm.hpp"
 
@@ -44,6 +45,7 @@ enum class DisturbanceRejection {
 
 /// The controller (17): its terms, gains and limits.
 struct ControllerSettings {
+  LawKind law;  ///< what follows belongs to `curvature` and `statics_pi`, limits apart
   ControlCoordinates coordinates = ControlCoordinates::u;
   ControlTerms terms;
   /// Diagonals of K_P (N m/rad) and K_D (N m s/rad), two numbers a segment: [u_x, u_y] or [phi,

@@ -6,7 +6,16 @@
 #include <span>
 #include <vector>
 
+#include "softarm/model/arm.hpp"
+
 namespace softarm {
+
+inline constexpr int kMaxChambersPerSegment = 8;
+inline constexpr int kMaxChambers = kMaxChambersPerSegment * kMaxSegments;
+
+/// One pressure per chamber (bar), segment by segment in the order of the valves. Storage in place:
+/// never allocates.
+using PressureVector = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, kMaxChambers, 1>;
 
 /// The chambers of one segment, all of one area and with their centroids as far from the axis.
 struct ChamberGeometry {

@@ -15,7 +15,8 @@
 #include "softarm/actuation/pressure_allocator.hpp"
 #include "softarm/actuation/pressure_ramps.hpp"
 #include "softarm/base/time.hpp"
-#include "softarm/control/curvature_controller.hpp"
+#include "softarm/control/control_law.hpp"
+#include "softarm/control/control_laws.hpp"
 #include "softarm/control/reference.hpp"
 #include "softarm/estimation/curvature_filter.hpp"
 #include "softarm/estimation/frame_validator.hpp"
@@ -37,6 +38,33 @@ struct LiveReferenceInput {
   SegmentVector u, velocity, acceleration;
 };
 
+/// A live target of the tip as it came over the wire, in the world frame.
+struct TipTargetInput {
+  Eigen::Vector3d position_m, velocity_mps;
+};
+
+/// An answer of an external law as it came over the wire.
+struct LawInput {
+  std::int64_t state_ns = kNever;  ///< tick of the state that it answers, on our clock
+  std::int64_t arrival_ns = kNever;
+  std::int64_t validity_ns = 0;  ///< from state_ns on
+  LawAnswer answer = LawAnswer::force;
+  PressureVector values;  ///< tau_u, 2n, N m; or a pressure a chamber, bar
+};
+
+/// What an external law is to answer: 2n numbers each, of the middle of the period in which an
+/// answer to it acts that comes in time for the next tick.
+struct LawView {
+  double active_s = 0.0;  ///< since the arm became ACTIVE; 0 where it is not
+  SegmentVector u_rad, velocity_radps;
+  /// Where the arm is not ACTIVE it rests at u_rad: so it will begin.
+  ReferenceSample reference;
+};
+
+/// How often something came, by what became of it (LawVerdict, LiveVerdict).
+template <int verdicts>
+using VerdictCounts = std::array<std::int64_t, verdicts>;
+
 /// What has happened since the last tick. Times are of one monotonic clock, in ns.
 struct TickInput {
   std::int64_t now_ns = 0;
@@ -48,6 +76,8 @@ struct TickInput {
   int consecutive_overruns = 0;  ///< ticks missed in a row; zero where they are not to be judged
   /// Arrival of the newest pressure measurement, where the valves publish them.
   std::int64_t newest_measurement_ns = kNever;
+  const TipTargetInput* tip_target = nullptr;  ///< the newest, if one came
+  const LawInput* law = nullptr;  ///< the newest answer of an external law, if one came
   /// The measured pressures (bar, one a chamber), if some came since the last tick.
   const PressureVector* measured_bar = nullptr;
   /// Arrival of the newest "go", where there is a dead-man input.
@@ -82,7 +112,12 @@ struct TickOutput {
   /// Correction of the model, its deviations and the innovations; null without a model-based
   /// observer, and while it does not run and `motion` is the kinematic filter's.
   const ModelObserver* observer = nullptr;
-  /// (17); empty unless ACTIVE. As of `motion` and `reference`: 3n where segments stretch.
+  /// What an external law is to answer; null without one, and where the motion is not known.
+  const LawView* law = nullptr;
+  /// Time in which the newest accepted answer of an external law came back; NaN without any.
+  double law_round_trip_s = std::numeric_limits<double>::quiet_NaN();
+  /// Of the law, (17); empty unless ACTIVE. As of `motion` and `reference`: 3n where segments
+  /// stretch.
   SegmentVector tau_actuation_nm;
   PressureVector pressure_bar;  ///< to be sent
 };
@@ -114,6 +149,12 @@ class ControlPipeline {
   bool has_observer() const noexcept { return observer_ != nullptr; }
   /// What it knows after the latest tick; `out` stays as it was where there is none.
   void report(ObserverReport& out) const noexcept;
+  /// Answers of an external law so far, by LawVerdict.
+  const VerdictCounts<kLawVerdicts>& law_counts() const noexcept { return law_counts_; }
+  /// Live references so far that came while the arm was ACTIVE, by LiveVerdict.
+  const VerdictCounts<kLiveVerdicts>& reference_counts() const noexcept {
+    return reference_counts_;
+  }
   /// Every commanded pressure is zero.
   bool fully_vented() const noexcept { return output_.pressure_bar.isZero(0.0); }
   /// Period of the tick, 1/rate_hz.
@@ -130,8 +171,13 @@ class ControlPipeline {
                const KnownMotion* expected) noexcept;
   void predict(std::int64_t now_ns, std::int64_t at_ns) noexcept;
   void expect(std::int64_t at_ns) noexcept;
+  void take_law(const TickInput& input, SafetyInput& safety) noexcept;
+  LawVerdict judge(const LawInput& law, std::int64_t now_ns) noexcept;
+  void view_for_law(Mode mode, std::int64_t act_ns) noexcept;
   void take_reference(const TickInput& input) noexcept;
+  void note_reference(LiveVerdict verdict) noexcept;
   void control(std::int64_t act_ns) noexcept;
+  void allocate() noexcept;
   void limit(Mode mode) noexcept;
   bool poses_frozen(std::int64_t now_ns) const noexcept;
   bool beyond_soft_limit(bool speed_too) const noexcept;
@@ -155,7 +201,10 @@ class ControlPipeline {
   ActivationLimit activation_limit_;
   std::int64_t answer_ns_;  ///< in which a command that moved must show in frames that are not late
   Reference reference_;
-  CurvatureController controller_;
+  std::unique_ptr<HoldLimits> hold_;
+  std::unique_ptr<ControlLaw> law_;
+  ExternalLawInput* external_;   ///< the same law, where it is external
+  SegmentVector most_force_nm_;  ///< of an external law: more is no force of this arm
   PressureAllocator allocator_;
   std::unique_ptr<ElongationReference> elongation_;  ///< where segments stretch
   PressureRamps ramps_;
@@ -170,6 +219,11 @@ class ControlPipeline {
   ReferenceWindow window_;
   KnownMotion known_;
   ControlOutput control_;
+  LawView law_view_;
+  FilteredMotion law_motion_;
+  VerdictCounts<kLawVerdicts> law_counts_{};
+  std::int64_t law_until_ns_ = kNever;
+  VerdictCounts<kLiveVerdicts> reference_counts_{};
   Allocation allocation_;
   PressureVector previous_bar_;
   SegmentVector previous_tau_nm_;                ///< that these give
@@ -178,6 +232,7 @@ class ControlPipeline {
   std::int64_t unanswered_since_ns_ = kForever;  ///< when the command moved away from it
   std::array<std::int64_t, kMaxSegments> seen_ns_{};
   std::int64_t epoch_ns_ = 0;
+  std::int64_t active_since_ns_ = 0;
   std::int64_t previous_ns_ = 0;
   std::int64_t newest_capture_ns_ = kNever;
   std::int64_t late_frames_ = 0;

@@ -52,10 +52,12 @@ enum class Reason : std::int8_t {
   frame_period_mismatch,
   activated_too_often,
   wrong_model,
-  contact,        ///< that HOLD answers
-  contact_vented  ///< that VENT answers
+  contact,         ///< that HOLD answers
+  contact_vented,  ///< that VENT answers
+  law_late,        ///< the newest answer of an external law is no longer valid
+  law_silent       ///< and has not been for a while
 };
-inline constexpr int kReasons = static_cast<int>(Reason::contact_vented) + 1;
+inline constexpr int kReasons = static_cast<int>(Reason::law_silent) + 1;
 
 /// As above, in static storage; "unknown" for a value outside the enumeration.
 const char* name(Mode mode) noexcept;
@@ -86,7 +88,8 @@ struct SafetyThresholds {
   std::int64_t vent_after_ns;  ///< frame age, or gap between ticks, that vents
   std::int64_t valve_silence_ns;
   std::int64_t deadman_timeout_ns;
-  std::int64_t arm_lapses_ns;  ///< an `arm` that has not led to ACTIVE by then is taken back
+  std::int64_t law_vent_after_ns;  ///< since the newest answer of an external law has expired
+  std::int64_t arm_lapses_ns;      ///< an `arm` that has not led to ACTIVE by then is taken back
 };
 /// Times given in the settings (s); where zero, derived from control and frame period T and T_f: HOLD
 /// after max(3 T, 3 T_f + latency), VENT after max(0.1 s, 10 T_f, 3 T). An `arm` lapses after 2 s plus
@@ -131,6 +134,8 @@ struct SafetyInput {
   bool deadman_used = false;           ///< there is a dead-man input
   std::int64_t newest_go_ns = kNever;  ///< arrival of the newest "go"
   std::int64_t newest_foreign_ns = kNever;  ///< of the newest command that another program sent
+  bool law_used = false;                    ///< control is by an external law
+  std::int64_t law_until_ns = kNever;       ///< end of validity of its newest answer
   OperatorRequests requests = {};
 };
 

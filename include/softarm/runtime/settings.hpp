@@ -54,6 +54,10 @@ struct SafetySettings {
   int contact_segment = 0;  ///< 0: the tip
   bool deadman = false;     ///< there is a dead-man input
   double deadman_timeout_s = 0.2;
+  /// Longest time from a state to the end of validity of an external law's answer to it, and from
+  /// there to VENT.
+  double law_validity_s = 0.1;
+  double law_vent_after_s = 0.1;
   /// How long a command is valid: the valve side vents by itself unless a newer one arrives.
   double command_validity_s = 0.1;
 };

@@ -3,6 +3,8 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
+#include <utility>
 #include <vector>
 
 #include "softarm/base/histogram.hpp"
@@ -20,6 +22,13 @@ class LockStep {
  public:
   /// @throws as ControlPipeline and SimulatedArm
   LockStep(const PipelineSettings& settings, const PlantSettings& plant);
+
+  /// Answers the tick with which it is called; false: it does not. Called after every tick whose
+  /// output has a `law`; the answer comes with the next tick, as that of a process that answers
+  /// within a period. state_ns and arrival_ns are filled in.
+  using Law = std::function<bool(const TickOutput&, LawInput&)>;
+  /// The law of an experiment with control.law: external.
+  void set_law(Law law) { external_ = std::move(law); }
 
   /// One tick at the next period. Where it is `logged` it leaves the plant, and `row`, in the
   /// middle of that period: there the tick's reference belongs. Otherwise the row stays as it was.
@@ -43,6 +52,9 @@ class LockStep {
   std::vector<MocapFrame> frames_;
   PressureVector measured_;
   std::int64_t ticks_ = 0;
+  Law external_;
+  LawInput answer_;
+  bool answered_ = false;
   DurationHistogram tick_times_;
 };
 

@@ -1,6 +1,7 @@
 // The messages of a daemon, its valves and a simulated arm as plain values, for every listener.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -11,6 +12,7 @@
 #include "softarm/estimation/frame_validator.hpp"
 #include "softarm/estimation/observer_report.hpp"
 #include "softarm/model/arm.hpp"
+#include "softarm/runtime/control_pipeline.hpp"
 #include "softarm/runtime/safety_monitor.hpp"
 
 namespace softarm {
@@ -46,6 +48,10 @@ struct ArmStatus {
   std::int64_t frames_missing = 0;
   std::int64_t overruns = 0;  ///< ticks missed
   std::int64_t messages_malformed = 0;
+  std::array<std::int64_t, kLiveVerdicts> references_refused{};  ///< by LiveVerdict
+  std::array<std::int64_t, kLawVerdicts> law_answers{};  ///< of an external law, by LawVerdict
+  /// From a state to the arrival of the newest accepted answer of an external law; NaN: none.
+  double law_round_trip_s = std::numeric_limits<double>::quiet_NaN();
 
   SegmentVector u_rad, velocity_radps;         ///< theta (cos phi, sin phi) of every segment
   SegmentVector reference_u_rad;               ///< NaN unless ACTIVE
@@ -98,11 +104,27 @@ struct ChamberCommand {
   PressureVector pressure_bar;   ///< gauge pressure; N m for a command of torques
 };
 
+/// What an external law is to answer (law_state_t): 2n numbers each, of the instant at which an
+/// answer acts that comes within one tick.
+struct LawRequest {
+  std::int64_t tick = 0;
+  std::int64_t time_us = 0;  ///< the daemon's monotonic clock at the tick
+  std::int64_t nonce = 0;    ///< to be echoed by the answer
+  Mode mode = Mode::init;
+  double active_s = 0.0;  ///< since the arm became ACTIVE; 0 where it is not
+  SegmentVector u_rad, velocity_radps;
+  /// Unless ACTIVE at rest at u_rad: so it will begin.
+  SegmentVector reference_u_rad, reference_velocity_radps, reference_acceleration_radps2;
+  PressureVector pressure_bar;  ///< commanded, bar; N m with actuation by torque
+};
+
 /// Decodes one controller_status_t as message_decoding.hpp does: returns false, and leaves `out`
 /// unspecified, unless `bytes` are exactly one message of the type. Values are not checked.
 bool decode(std::span<const std::byte> bytes, ArmStatus& out);
 /// The same of an observer_status_t.
 bool decode(std::span<const std::byte> bytes, ObserverStatus& out);
+/// The same of a law_state_t.
+bool decode(std::span<const std::byte> bytes, LawRequest& out);
 /// The same of a plant_state_t.
 bool decode(std::span<const std::byte> bytes, PlantState& out);
 /// The same of a pressure_command_t, or of a torque_command_t where `by_torque`.

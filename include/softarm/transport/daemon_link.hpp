@@ -5,10 +5,12 @@
 #include <optional>
 #include <softarm_messages/curvature_reference_t.hpp>
 #include <softarm_messages/deadman_t.hpp>
+#include <softarm_messages/law_command_t.hpp>
 #include <softarm_messages/operator_command_t.hpp>
 #include <softarm_messages/pressure_command_t.hpp>
 #include <softarm_messages/pressure_measurement_t.hpp>
 #include <softarm_messages/timing_t.hpp>
+#include <softarm_messages/tip_target_t.hpp>
 #include <softarm_messages/torque_command_t.hpp>
 #include <vector>
 
@@ -32,6 +34,7 @@ struct LoopTiming {
   DurationHistogram frame_age;  ///< capture of the newest frame to the tick
   DurationHistogram tick;       ///< from wake-up to the command
   DurationHistogram publish;    ///< publishing command and status
+  DurationHistogram law;        ///< from a state to the arrival of an external law's answer to it
   std::int64_t ticks = 0;
   std::int64_t overruns = 0;  ///< deadlines missed
 };
@@ -58,6 +61,8 @@ class DaemonLink {
   /// sent, because it would be a step up from vented valves; the next tick is informed by
   /// TickInput::command_expired.
   void publish_command(std::int64_t now_ns, const TickOutput& output) noexcept;
+  /// Publishes what an external law is to answer, if the tick has it. A shadow does not.
+  void publish_law_state(std::int64_t now_ns, const TickOutput& output) noexcept;
   /// Publishes the status of the tick, with overruns from `timing`.
   void publish_status(std::int64_t now_ns, const ControlPipeline& pipeline,
                       const LoopTiming& timing) noexcept;
@@ -84,6 +89,14 @@ class DaemonLink {
   std::int64_t backward_references() const noexcept { return backward_references_; }
   /// How far the connection to a motion-capture server is; none over LCM.
   std::optional<MocapStanding> mocap_standing() const noexcept { return mocap_.standing(); }
+  /// Live references and targets of the tip, those refused before the pipeline included.
+  VerdictCounts<kLiveVerdicts> live_counts(const ControlPipeline& pipeline) const noexcept {
+    return sum(pipeline.reference_counts(), references_refused_);
+  }
+  /// The same of answers of an external law.
+  VerdictCounts<kLawVerdicts> law_counts(const ControlPipeline& pipeline) const noexcept {
+    return sum(pipeline.law_counts(), law_refused_);
+  }
   /// Publications that failed, and commands that were too late to send.
   std::int64_t unsent() const noexcept { return unsent_; }
 
@@ -91,11 +104,18 @@ class DaemonLink {
   void take_frame(std::size_t channel, const ReceivedMessage& packet) noexcept;
   void receive_frames() noexcept;
   void take_reference(const ReceivedMessage& packet) noexcept;
+  void take_tip_target(const ReceivedMessage& packet) noexcept;
+  void take_law(const ReceivedMessage& packet) noexcept;
   void take_operator(const ReceivedMessage& packet) noexcept;
   void take_measurement(const ReceivedMessage& packet) noexcept;
   void take_valves_report() noexcept;
   void take_go(const ReceivedMessage& packet) noexcept;
   void take_command(const ReceivedMessage& packet) noexcept;
+  template <class Counts>
+  static Counts sum(Counts a, const Counts& b) noexcept {
+    for (std::size_t k = 0; k < a.size(); ++k) a[k] += b[k];
+    return a;
+  }
   bool requests_lost(std::int64_t previous_ns) noexcept;
   bool is_recent(std::int64_t nonce, std::int64_t since_us) const noexcept;
   std::int64_t arrival_ns(const ReceivedMessage& packet) const noexcept;
@@ -120,6 +140,14 @@ class DaemonLink {
   PressureVector measured_bar_;
   std::int64_t newest_reference_ns_ = kNever;
   std::int64_t reference_sequence_;
+  TipTargetInput tip_target_;
+  std::int64_t newest_tip_ns_ = kNever;
+  std::int64_t tip_sequence_ = kNever;
+  LawInput law_;
+  std::int64_t newest_law_ns_ = kNever;
+  std::int64_t law_sequence_ = kNever;
+  VerdictCounts<kLawVerdicts> law_refused_{};
+  VerdictCounts<kLiveVerdicts> references_refused_{};
   std::int64_t newest_foreign_ns_ = kNever;
   int requests_ = 0, goes_ = 0;  ///< since the last tick
   bool released_ = false;        ///< the dead-man input, since the last tick
@@ -158,6 +186,8 @@ class DaemonLink {
   softarm_messages::pressure_command_t heard_pressures_;
   softarm_messages::torque_command_t heard_torques_;
   softarm_messages::timing_t timing_message_;
+  softarm_messages::tip_target_t tip_message_{};
+  softarm_messages::law_command_t law_message_;
 };
 
 }  // namespace softarm

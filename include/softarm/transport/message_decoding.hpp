@@ -6,6 +6,8 @@
 #include <softarm_messages/controller_status_t.hpp>
 #include <softarm_messages/curvature_reference_t.hpp>
 #include <softarm_messages/deadman_t.hpp>
+#include <softarm_messages/law_command_t.hpp>
+#include <softarm_messages/law_state_t.hpp>
 #include <softarm_messages/mocap_frame_t.hpp>
 #include <softarm_messages/observer_status_t.hpp>
 #include <softarm_messages/operator_command_t.hpp>
@@ -15,6 +17,7 @@
 #include <softarm_messages/rigid_transform_t.hpp>
 #include <softarm_messages/tick_record_t.hpp>
 #include <softarm_messages/timing_t.hpp>
+#include <softarm_messages/tip_target_t.hpp>
 #include <softarm_messages/torque_command_t.hpp>
 #include <softarm_messages/valves_status_t.hpp>
 #include <span>
@@ -47,6 +50,12 @@ bool decode(std::span<const std::byte> bytes,
 /// Decodes a controller_status_t.
 bool decode(std::span<const std::byte> bytes,
             softarm_messages::controller_status_t& message) noexcept;
+/// Decodes a tip_target_t.
+bool decode(std::span<const std::byte> bytes, softarm_messages::tip_target_t& message) noexcept;
+/// Decodes a law_state_t.
+bool decode(std::span<const std::byte> bytes, softarm_messages::law_state_t& message) noexcept;
+/// Decodes a law_command_t.
+bool decode(std::span<const std::byte> bytes, softarm_messages::law_command_t& message) noexcept;
 /// Decodes a plant_state_t.
 bool decode(std::span<const std::byte> bytes, softarm_messages::plant_state_t& message) noexcept;
 /// Decodes a timing_t.

@@ -24,9 +24,13 @@ class NonceClock {
   std::int64_t at(std::int64_t now_us) const noexcept {
     return static_cast<std::int64_t>(start_ + static_cast<std::uint64_t>(now_us));
   }
+  /// The instant of which `nonce` is, if it is ours.
+  std::int64_t instant_us(std::int64_t nonce) const noexcept {
+    return static_cast<std::int64_t>(static_cast<std::uint64_t>(nonce) - start_);
+  }
   /// Whether `nonce` is of an instant in the last second up to now, and not before `since_us`.
   bool accepts(std::int64_t nonce, std::int64_t now_us, std::int64_t since_us) const noexcept {
-    const auto issued_us = static_cast<std::int64_t>(static_cast<std::uint64_t>(nonce) - start_);
+    const std::int64_t issued_us = instant_us(nonce);
     return issued_us >= since_us && issued_us <= now_us && issued_us > now_us - kAccepted_us;
   }
 

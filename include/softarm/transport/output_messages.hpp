@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <softarm_messages/controller_status_t.hpp>
+#include <softarm_messages/law_state_t.hpp>
 #include <softarm_messages/observer_status_t.hpp>
 #include <softarm_messages/pressure_command_t.hpp>
 #include <softarm_messages/torque_command_t.hpp>
@@ -39,6 +40,8 @@ class OutputMessages {
 
   /// Fills what the model-based observer knows, except `time_us`. @return whether there is one
   bool set_observer(std::int64_t tick, const ControlPipeline& pipeline) noexcept;
+  /// Fills what an external law is to answer, except `time_us` and `nonce`. The output must have it.
+  void set_law_state(std::int64_t tick, const TickOutput& output) noexcept;
 
   /// Whether commands are torques: another type, which no valve terminal decodes.
   bool by_torque() const noexcept { return by_torque_; }
@@ -47,6 +50,7 @@ class OutputMessages {
   softarm_messages::torque_command_t torque_command;
   softarm_messages::controller_status_t status;
   softarm_messages::observer_status_t observer;
+  softarm_messages::law_state_t law_state;
 
  private:
   Eigen::Index width_;  ///< coordinates of a segment

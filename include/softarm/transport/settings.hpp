@@ -26,6 +26,9 @@ struct LcmSettings {
   std::string valves_channel = "SOFTARM_VALVES";
   std::string plant_channel = "SOFTARM_PLANT";
   std::string deadman_channel;
+  std::string tip_channel = "SOFTARM_TIP_TARGET";
+  std::string law_state_channel = "SOFTARM_LAW_STATE";
+  std::string law_channel = "SOFTARM_LAW";
 };
 
 /// Where the server of a source without LCM is.

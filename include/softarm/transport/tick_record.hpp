@@ -32,6 +32,8 @@ class RecordedInput {
   TickInput input_;
   std::vector<MocapFrame> frames_;
   LiveReferenceInput reference_;
+  TipTargetInput tip_target_;
+  LawInput law_;
   PressureVector measured_bar_;
 };
 

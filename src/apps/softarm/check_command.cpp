@@ -53,8 +53,9 @@ int check(const CheckOptions& options) {
   }
   if (options.live) return check_live(experiment, options.live_check);
   LoopCheck loop;
+  const bool external = experiment.control.law.get_if<ExternalLaw>() != nullptr;
   const bool simulated =
-      options.margins || (options.loop && experiment.arm.size() <= kMostSimulated);
+      !external && (options.margins || (options.loop && experiment.arm.size() <= kMostSimulated));
   if (simulated)
     loop = check_loop(experiment, options.margins ? LoopDepth::margins : LoopDepth::stability);
   for (const std::string& warning : loop_warnings(loop))
@@ -62,7 +63,8 @@ int check(const CheckOptions& options) {
   fmt::print("# {}, configuration {}\n{}", options.file, hash_text(experiment.hash),
              resolved_text(experiment));
   for (const std::string& line : reaction_times(experiment)) fmt::print("# {}\n", line);
-  if (!simulated) fmt::print("# loop: not simulated; softarm check --margins does\n");
+  if (external) fmt::print("# loop: not simulated; its law is in another process\n");
+  if (!simulated && !external) fmt::print("# loop: not simulated; softarm check --margins does\n");
   print_margins(loop.configured);
   print_margins(loop.worst);
   return kExitOk;

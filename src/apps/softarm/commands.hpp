@@ -27,13 +27,16 @@ void add_import_command(CLI::App& app);
 /// softarm jog CONFIG SEGMENT CHAMBER PRESSURE
 void add_jog_command(CLI::App& app);
 
+/// softarm law FILE.py:CLASS CONFIG [--duration S]
+void add_law_command(CLI::App& app);
+
 /// softarm replay LOG CONFIG [--any-configuration] [--json]
 void add_replay_command(CLI::App& app);
 
 /// softarm report LOG CONFIG [--out DIR]
 void add_report_command(CLI::App& app);
 
-/// softarm run CONFIG [--out DIR] [--duration S] [--seed N]
+/// softarm run CONFIG [--out DIR] [--duration S] [--seed N] [--law MODULE:CLASS]
 void add_run_command(CLI::App& app);
 
 /// softarm view CONFIG [--log LOG] [--port PORT] [--control]

@@ -51,6 +51,7 @@ void LiveView::draw(const StatusRecord& record) {
       status.version.empty() ? "" : "   softarmd " + status.version, status_hz_, frames_hz_,
       1e3 * status.frame_age_s, status.frames_accepted, status.frames_rejected,
       status.frames_repeated, status.frames_missing, status.overruns, status.messages_malformed);
+  text += input_text(status);
   const bool torque = experiment_.actuation.kind == ActuationKind::torque;
   const bool stretches = status.elongation_m.size() > 0;
   text += fmt::format("segment   theta [rad]   phi [rad]   error of u [mrad]   {}{}\n",
@@ -63,6 +64,23 @@ void LiveView::draw(const StatusRecord& record) {
   softarm::draw(lines_ > 0 ? fmt::format("\033[{}A\033[J", lines_) : "", text);
   lines_ = std::count(text.begin(), text.end(), '\n');
   drawn_ns_ = monotonic_now_ns();
+}
+
+std::string LiveView::input_text(const ArmStatus& status) {
+  std::string refused;
+  const auto count = [&refused]<class Verdict>(const char* what, const auto& counts, Verdict) {
+    for (std::size_t k = 1; k < counts.size(); ++k)
+      if (counts[k] > 0)
+        refused += fmt::format("   {} {} {}", what, counts[k], name(static_cast<Verdict>(k)));
+  };
+  count("reference", status.references_refused, LiveVerdict{});
+  count("law", status.law_answers, LawVerdict{});
+  std::string text;
+  if (status.law_answers[0] > 0)
+    text += fmt::format("law {} answers, the newest after {:.2f} ms\n", status.law_answers[0],
+                        1e3 * status.law_round_trip_s);
+  if (!refused.empty()) text += fmt::format("refused{}\n", refused);
+  return text;
 }
 
 std::string LiveView::segment_text(const ArmStatus& status, int segment) const {

@@ -20,6 +20,7 @@ class LiveView {
   void draw(const StatusRecord& record);
 
  private:
+  static std::string input_text(const ArmStatus& status);
   std::string segment_text(const ArmStatus& status, int segment) const;
   void update_rates(const StatusRecord& record);
 

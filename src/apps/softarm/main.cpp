@@ -14,6 +14,7 @@ int main(int argc, char** argv) {
   softarm::add_identify_command(app);
   softarm::add_import_command(app);
   softarm::add_jog_command(app);
+  softarm::add_law_command(app);
   softarm::add_replay_command(app);
   softarm::add_report_command(app);
   softarm::add_run_command(app);

@@ -4,11 +4,13 @@
 
 #include <cmath>
 #include <memory>
+#include <optional>
 
 #include "apps/program.hpp"
 #include "apps/progress.hpp"
 #include "apps/signals.hpp"
 #include "apps/softarm/commands.hpp"
+#include "apps/softarm/law_process.hpp"
 #include "apps/softarm/learned_output.hpp"
 #include "apps/softarm/plots.hpp"
 #include "softarm/base/clock.hpp"
@@ -26,7 +28,7 @@ namespace {
 struct RunOptions {
   std::string config;
   std::string out = "out";
-  std::string mocap_log, learned;
+  std::string mocap_log, learned, law;
   bool plots = true;
   double duration_s = 0.0;
   std::uint64_t seed = 0;
@@ -72,6 +74,11 @@ std::string never_active(const TickOutput& end, const Experiment& experiment, do
 int run(const RunOptions& options) {
   Experiment experiment = load_experiment(options.config);
   if (options.has_seed) experiment.seed = experiment.plant.seed = options.seed;
+  if (!options.law.empty()) experiment.control.law = ExternalLaw{};
+  if (options.law.empty() && experiment.control.law.get_if<ExternalLaw>() != nullptr) {
+    print_error("softarm", "control.law is external: in simulation name it, --law MODULE:CLASS");
+    return kExitUsage;
+  }
   const double duration_s =
       options.duration_s > 0.0 ? options.duration_s : experiment.run.duration_s;
   const double period_s = 1.0 / experiment.rate_hz;
@@ -113,7 +120,14 @@ int run(const RunOptions& options) {
   };
   std::unique_ptr<LoggedRun> logged;
   if (options.mocap_log.empty()) {
-    record_and_report(*std::make_unique<LockStep>(experiment, experiment.plant));
+    const auto steps = std::make_unique<LockStep>(experiment, experiment.plant);
+    std::optional<LawProcess> law;
+    if (!options.law.empty()) {
+      law.emplace(options.law, options.config, experiment);
+      steps->set_law(
+          [&law](const auto& output, auto& answer) { return law->answer(output, answer); });
+    }
+    record_and_report(*steps);
   } else {
     logged = std::make_unique<LoggedRun>(experiment, options.mocap_log);
     record_and_report(*logged);
@@ -155,8 +169,13 @@ void add_run_command(CLI::App& app) {
       ->add_option("--duration", options->duration_s,
                    "simulated time in s (default: run.duration_s)")
       ->check(positive_seconds());
-  command->add_option("--mocap", options->mocap_log,
-                      "take the frames from this LCM log instead of the simulated arm");
+  CLI::Option* log =
+      command->add_option("--mocap", options->mocap_log,
+                          "take the frames from this LCM log instead of the simulated arm");
+  command
+      ->add_option("--law", options->law,
+                   "control by this Python class, MODULE:CLASS or FILE.py:CLASS (softarm.law)")
+      ->excludes(log);
   add_learned_option(*command, options->learned);
   command->add_flag("!--no-plots", options->plots, "do not draw the plots");
   auto* seed = command

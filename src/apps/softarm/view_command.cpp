@@ -1,27 +1,15 @@
-// softarm view: the arm in a browser. The page is made by the Python package; this finds it and a
-// Python that has viser.
-#include <unistd.h>
-
+// softarm view: the arm in a browser. The page is made by the Python package.
 #include <cerrno>
-#include <cstdlib>
 #include <cstring>
-#include <filesystem>
 #include <memory>
 #include <string>
-#include <vector>
 
 #include "apps/program.hpp"
 #include "apps/softarm/commands.hpp"
+#include "apps/softarm/python_module.hpp"
 
 namespace softarm {
 namespace {
-
-/// $SOFTARM_PYTHON, the environment that tools/python_environment makes, or Debian's.
-std::string python() {
-  if (const char* chosen = std::getenv("SOFTARM_PYTHON")) return chosen;
-  const std::string environment = SOFTARM_PYTHON_ENVIRONMENT "/bin/python";
-  return std::filesystem::exists(environment) ? environment : "/usr/bin/python3";
-}
 
 struct ViewOptions {
   std::string config;
@@ -33,23 +21,10 @@ struct ViewOptions {
 
 /// Replaces this program; returns only where that fails.
 int view(const ViewOptions& options) {
-  std::error_code error;
-  const auto program = std::filesystem::read_symlink("/proc/self/exe", error);
-  const auto built = program.parent_path().parent_path() / "python";
-  if (std::filesystem::exists(built / "softarm", error)) ::setenv("PYTHONPATH", built.c_str(), 1);
-  std::vector<std::string> words = {python(),
-                                    "-m",
-                                    "softarm.view",
-                                    options.config,
-                                    options.log,
-                                    options.host,
-                                    std::to_string(options.port),
-                                    options.control ? "control" : ""};
-  std::vector<char*> pointers;
-  for (std::string& word : words) pointers.push_back(word.data());
-  pointers.push_back(nullptr);
-  ::execv(pointers[0], pointers.data());
-  print_error("softarm", "cannot start " + words[0] + ": " + std::strerror(errno) +
+  const std::string python = run_python_module(
+      "softarm.view", {options.config, options.log, options.host, std::to_string(options.port),
+                       options.control ? "control" : ""});
+  print_error("softarm", "cannot start " + python + ": " + std::strerror(errno) +
                              "; tools/python_environment makes a Python for this");
   return kExitFailure;
 }

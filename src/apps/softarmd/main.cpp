@@ -33,6 +33,7 @@ void print_summary(const DaemonLoop& loop) {
   line("frame age", timing.frame_age);
   line("tick", timing.tick);
   line("publish", timing.publish);
+  if (timing.law.max_us() > 0.0) line("law", timing.law);
   const FrameCounters& frames = loop.pipeline().counters();
   say(fmt::format(
       "softarmd: {} ticks, {} missed; frames: {} accepted, {} rejected, {} repeated, {} missing; "
@@ -99,11 +100,13 @@ void run(DaemonLoop& loop, LineLog& log, ServiceNotifier& service, const LcmSett
         .late_frames = loop.pipeline().late_frames(),
         .frame_channel = lcm.mocap_channel,
         .measurements = {lcm.measurement_channel, loop.link().backward_measurements()},
-        .references = {lcm.reference_channel, loop.link().backward_references()}};
-    if (const auto text = report_inputs.refusals(now_ns, counts); !text.empty())
-      log.add("{}", text);
-    if (const auto text = report_inputs.second_sender(now_ns, counts); !text.empty())
-      log.add("{}", text);
+        .references = {lcm.reference_channel, loop.link().backward_references()},
+        .live = loop.link().live_counts(loop.pipeline()),
+        .answers = loop.link().law_counts(loop.pipeline())};
+    for (const auto report : {&InputReport::refusals, &InputReport::refused_references,
+                              &InputReport::refused_answers, &InputReport::second_sender})
+      if (const auto text = (report_inputs.*report)(now_ns, counts); !text.empty())
+        log.add("{}", text);
   };
   std::optional<MocapStanding> standing;
   const auto report_mocap = [&] {

@@ -24,7 +24,7 @@ constexpr double kPeriod_s = 0.125;  // an `arm` lapses after 2.5 s with it
 /// All times are multiples of this, so that ages take few values, each threshold itself among them.
 constexpr std::int64_t kStep = 500 * kMs;
 constexpr std::int64_t kHold = kStep, kVent = 2 * kStep, kSilence = kStep, kDeadman = kStep,
-                       kDeaf = kStep, kForeign = 2 * kStep;
+                       kDeaf = kStep, kForeign = 2 * kStep, kLawVent = kStep;
 constexpr int kHoldOverruns = 2, kVentOverruns = 4, kGoodFrames = 2;
 /// From one tick to the next: at the threshold of silence, at that of a stop, and beyond it.
 constexpr std::array kGaps = {kSilence, kVent, kVent + kStep};
@@ -69,6 +69,10 @@ const std::vector<Trigger> kTriggers = {
     {Reason::poses_frozen, 12, [](SafetyInput& in) { in.poses_frozen = true; }},
     {Reason::frame_period_mismatch, 20, [](SafetyInput& in) { in.frame_period_mismatch = true; }},
     {Reason::activated_too_often, 21, [](SafetyInput& in) { in.activated_too_often = true; }},
+    {Reason::law_silent, 22,
+     [](SafetyInput& in) { in.law_until_ns = in.now_ns - kLawVent - kStep; }},
+    {Reason::law_silent, 22, [](SafetyInput& in) { in.law_until_ns = kNever; }},
+    {Reason::law_late, 22, [](SafetyInput& in) { in.law_until_ns = in.now_ns - kLawVent; }},
     {Reason::overruns, 10, [](SafetyInput& in) { in.consecutive_overruns = kHoldOverruns; }},
     {Reason::overruns, 10, [](SafetyInput& in) { in.consecutive_overruns = kVentOverruns - 1; }},
 };
@@ -81,6 +85,7 @@ SafetyInput healthy(std::int64_t now_ns) {
   in.newest_measurement_ns = now_ns;
   in.newest_go_ns = now_ns - kDeadman;
   in.newest_foreign_ns = now_ns - kForeign - kStep;
+  in.law_until_ns = now_ns;
   in.consecutive_overruns = kHoldOverruns - 1;
   return in;
 }
@@ -97,6 +102,7 @@ SafetySettings settings_of(const Setup& setup) {
   settings.vent_after_s = 1e-9 * kVent;
   settings.valve_silence_s = 1e-9 * kSilence;
   settings.deadman_timeout_s = 1e-9 * kDeadman;
+  settings.law_vent_after_s = 1e-9 * kLawVent;
   settings.good_frames = kGoodFrames;
   settings.hold_overruns = setup.watches ? kHoldOverruns : 0;
   settings.vent_overruns = setup.watches ? kVentOverruns : 0;
@@ -239,7 +245,8 @@ class Judge {
   }
   bool watched(Reason reason) const {
     return setup_.watches || (reason != Reason::overruns && reason != Reason::many_overruns &&
-                              reason != Reason::deadman_released);
+                              reason != Reason::deadman_released && reason != Reason::law_silent &&
+                              reason != Reason::law_late);
   }
   /// A reason's first row is for an arm with pressure where it has a second.
   void add(Reason reason, Mode mode, bool vented) const {
@@ -411,7 +418,7 @@ class Exploration {
       kTriggers[std::size_t(trigger)].raise(in);
       raised[count++] = kTriggers[std::size_t(trigger)].reason;
     }
-    in.deadman_used = setup_.watches;
+    in.deadman_used = in.law_used = setup_.watches;
     State next = frontier_[index];
     if (next.seen.shutting_down && !in.requests.shutdown) {  // it stays requested
       in.requests.shutdown = true;
@@ -435,7 +442,7 @@ class Exploration {
     if (state.seen.shutting_down) return;
     const auto tick = [&](bool disarm, bool arm) {
       SafetyInput in = healthy(state.seen.now_ns + kGaps[0]);
-      in.deadman_used = setup_.watches;
+      in.deadman_used = in.law_used = setup_.watches;
       in.fully_vented = true;
       in.good_frames = 1;
       in.requests.disarm = disarm;

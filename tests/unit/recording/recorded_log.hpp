@@ -59,7 +59,8 @@ struct RecordedRun {
 
 /// Runs the pipeline on a simulated arm for `seconds` and appends to the log what a daemon would
 /// have published. Faults: a body occluded, frames doubled, broken and kept back, the process
-/// stopped, disarmed and armed, a live reference sent, and shut down.
+/// stopped, disarmed and armed, a live reference sent, a live target of the tip and the answers of
+/// an external law where the experiment has these, and shut down.
 inline RecordedRun record_run(const Experiment& experiment, double seconds, bool shadow,
                               LogBytes& log, const Losses& losses = {},
                               std::int64_t start_ns = 7'000'000'000) {
@@ -81,6 +82,9 @@ inline RecordedRun record_run(const Experiment& experiment, double seconds, bool
   const auto ticks = to_ns(seconds) / period_ns;
   const SegmentVector zero = SegmentVector::Zero(experiment.arm.dof());
   const LiveReferenceInput reference{zero, zero, zero};
+  const TipTargetInput target{{0.02, 0.01, -0.31}, {0.01, 0.0, 0.0}};
+  LawInput law, next;
+  bool answered = false;
   for (std::int64_t k = 1; k <= ticks; ++k) {
     const double part = static_cast<double>(k) / static_cast<double>(ticks);
     if (k == ticks * 6 / 10) stopped_ns = 300'000'000;
@@ -100,12 +104,23 @@ inline RecordedRun record_run(const Experiment& experiment, double seconds, bool
     input.now_ns = now_ns;
     input.frames = frames;
     if (k % 50 == 0) input.reference = &reference;
+    if (k % 50 == 25) input.tip_target = &target;
+    if (answered) {
+      law = next;
+      input.law = &law;
+    }
     input.requests.disarm = k == ticks * 8 / 10;
     input.requests.arm = k % 40 == 0;
     input.requests.shutdown = part > 0.95;
     input.command_expired = k == ticks * 6 / 10;
     input.consecutive_overruns = k % 17 == 0 ? 1 : 0;
     const TickOutput& output = pipeline.tick(input);
+    answered = output.law != nullptr && (part < 0.15 || part > 0.22);
+    if (answered) {
+      next = {now_ns, now_ns + period_ns / 2, 20'000'000, LawAnswer::force, PressureVector()};
+      next.values = 0.5 * output.law->reference.u - 0.1 * output.law->u_rad;
+      if (k % 31 == 0) next.values[0] = std::numeric_limits<double>::quiet_NaN();
+    }
     messages.set_command(k, output);
     messages.pressure_command.time_us = messages.torque_command.time_us = now_ns / 1000 + 11;
     messages.by_torque() ? log.add_message(lcm.command_channel, messages.torque_command)

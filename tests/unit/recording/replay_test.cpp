@@ -84,6 +84,20 @@ TEST(Replay, AnArmThatStretchesIsReproducedBitForBit) {
   EXPECT_GT(std::count(run.modes.begin(), run.modes.end(), Mode::active), 100);
   const ReplaySummary summary = replay(log.bytes, experiment).summary;
   EXPECT_TRUE(summary.complete());
+}
+
+TEST(Replay, AnExternalLawAndTargetsOfTheTipAreReproducedToo) {
+  Experiment experiment = paper_arm();
+  experiment.control.law = ExternalLaw{};
+  experiment.reference.phases.insert(experiment.reference.phases.begin(),
+                                     {LiveTipReference{}, 1.0});
+  LogBytes log;
+  const test::RecordedRun run = test::record_run(experiment, 4.0, false, log);
+  for (const Mode mode : {Mode::wait_frames, Mode::active, Mode::hold, Mode::vent})
+    EXPECT_GT(std::count(run.modes.begin(), run.modes.end(), mode), 5) << name(mode);
+  const ReplaySummary summary = replay(log.bytes, experiment).summary;
+  EXPECT_TRUE(summary.complete());
+  EXPECT_EQ(summary.records.compared, run.ticks);
   EXPECT_EQ(summary.statuses.compared, run.ticks);
 }
 

@@ -27,7 +27,7 @@ constexpr int kGoodFrames = 50;
 class Bench {
  public:
   explicit Bench(Arming arming) : monitor(settings(arming), kPeriod_s) {
-    input.deadman_used = true;
+    input.deadman_used = input.law_used = true;
     input.fully_vented = true;
   }
 
@@ -37,6 +37,7 @@ class Bench {
     if (frames) input.newest_capture_ns = input.now_ns - 5 * kMs;
     if (measurements) input.newest_measurement_ns = input.now_ns;
     if (go) input.newest_go_ns = input.now_ns;
+    if (law) input.law_until_ns = input.now_ns + 100 * kMs;  // as a daemon grants
     if (limit) input.activated_too_often = limit->reached(input.now_ns, monitor);
     const Mode mode = monitor.step(input);
     if (limit) limit->note(input.now_ns, last_mode, input.requests.arm, monitor);
@@ -65,7 +66,7 @@ class Bench {
   SafetyMonitor monitor;
   std::optional<ActivationLimit> limit;  ///< none: the input says it
   SafetyInput input{.now_ns = 1'000'000'000};
-  bool frames = true, measurements = true, go = true;
+  bool frames = true, measurements = true, go = true, law = true;
   std::int64_t gap_ns = 0;
 
  private:
@@ -141,6 +142,8 @@ const std::vector<Row>& rows() {
       {Reason::activated_too_often, Mode::vent, Clearance::arm, false, 1,
        [](Bench& b) { b.input.activated_too_often = true; },
        [](Bench& b) { b.input.activated_too_often = false; }},
+      {Reason::law_silent, Mode::vent, Clearance::good_frames, false, 101,
+       [](Bench& b) { b.law = false; }, [](Bench& b) { b.law = true; }},
       {Reason::frame_period_mismatch, Mode::vent, Clearance::good_frames, false, 1,
        [](Bench& b) { b.input.frame_period_mismatch = true; },
        [](Bench& b) { b.input.frame_period_mismatch = false; }},
@@ -150,6 +153,8 @@ const std::vector<Row>& rows() {
       {Reason::frames_late, Mode::hold, Clearance::good_frames, false, 1,
        [](Bench& b) { b.input.motion_unknown = true; },
        [](Bench& b) { b.input.motion_unknown = false; }},
+      {Reason::law_late, Mode::hold, Clearance::good_frames, false, 51,
+       [](Bench& b) { b.law = false; }, [](Bench& b) { b.law = true; }},
       {Reason::poses_frozen, Mode::hold, Clearance::good_frames, false, 1,
        [](Bench& b) { b.input.poses_frozen = true; },
        [](Bench& b) { b.input.poses_frozen = false; }},

@@ -18,6 +18,7 @@ using test::kMs;
 using test::PipelineBench;
 using test::PressureLimits;
 using test::RandomFaults;
+using test::RandomLaw;
 
 /// What the daemon promises, judged from what it was given and what it gave, by a reckoning of its
 /// own.
@@ -90,10 +91,13 @@ TEST(PipelineInvariants, HoldInEveryTickOfRandomSequences) {
                             experiment.actuation.vent_bar_per_s * experiment.rate_hz;
   std::set<Mode> modes;
   std::set<Reason> reasons;
-  for (unsigned seed = 1; seed <= 40; ++seed) {
+  for (unsigned seed = 1; seed <= 52; ++seed) {
+    const bool external = seed > 40;
+    experiment.control.law = external ? LawKind(ExternalLaw{}) : LawKind();
     experiment.safety.arming = seed % 2 == 0 ? Arming::automatic : Arming::explicit_;
     PipelineBench bench(experiment);
     RandomFaults faults(bench, seed);
+    RandomLaw law(bench, seed);
     Promises promises(bench, experiment);
     promises.vent_within(vent_ticks);
     bench.corrupt = [&](MocapFrame& frame) { return faults.corrupt(frame); };
@@ -101,11 +105,15 @@ TEST(PipelineInvariants, HoldInEveryTickOfRandomSequences) {
     const auto tick = [&] {
       faults.before_tick();
       faults.others_before_tick();
+      if (external) law.before_tick();
       const bool disarm = bench.input.requests.disarm,
                  emergency_stop = bench.input.requests.emergency_stop;
       const TickOutput& output = bench.tick();
       modes.insert(output.mode);
       reasons.insert(output.reason);
+      const std::int64_t until_ns = external ? law.until_ns() : kForever;
+      if (output.mode == Mode::active && bench.now_ns > until_ns)
+        return std::string("ACTIVE without a valid answer of its law");
       return promises.broken(output, disarm, emergency_stop);
     };
     for (unsigned k = 0; k < 3000 + 71 * seed; ++k)

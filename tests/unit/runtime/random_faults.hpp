@@ -107,4 +107,47 @@ class RandomFaults {
   bool leaking_ = false;
 };
 
+/// An external law that falls silent, is late and gives anything.
+class RandomLaw {
+ public:
+  RandomLaw(PipelineBench& bench, unsigned seed) : bench_(bench), random_(seed + 2000) {}
+
+  /// Answers the state of the tick before, or does not.
+  void before_tick() {
+    bench_.input.law = nullptr;
+    if (chance(0.003)) silent_ = true;
+    if (chance(0.02)) silent_ = false;
+    if (silent_ || bench_.pipeline.output().law == nullptr) return;
+    constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+    answer_.state_ns = bench_.now_ns - (chance(0.1) ? 40 * kMs : 0);
+    answer_.arrival_ns = bench_.now_ns;
+    answer_.validity_ns = chance(0.01) ? -1 : 30 * kMs;
+    answer_.answer = chance(0.5) ? LawAnswer::force : LawAnswer::pressures;
+    const bool force = answer_.answer == LawAnswer::force;
+    std::uniform_real_distribution<double> number(force ? -0.5 : 0.0, force ? 0.5 : 1.0);
+    answer_.values.resize(chance(0.02) ? 7 : force ? 6 : 12);
+    for (double& each : answer_.values) each = number(random_);
+    if (chance(0.05)) answer_.values[3] = chance(0.5) ? kNan : -1e9;
+    bench_.input.law = &answer_;
+  }
+  /// What a daemon may go by after that tick: the end of the newest good answer.
+  std::int64_t until_ns() {
+    const bool came = bench_.input.law != nullptr;
+    const Eigen::Index size = answer_.answer == LawAnswer::force ? 6 : 12;
+    if (came && answer_.values.size() == size && answer_.values.allFinite() &&
+        answer_.values.minCoeff() > -1e3 && bench_.now_ns < answer_.state_ns + answer_.validity_ns)
+      until_ns_ = answer_.state_ns + answer_.validity_ns;
+    return until_ns_;
+  }
+
+ private:
+  bool chance(double p) { return std::bernoulli_distribution(p)(random_); }
+
+  PipelineBench& bench_;
+  std::mt19937 random_;
+  LawInput answer_;
+  std::int64_t until_ns_ = kNever;
+  bool silent_ = false;
+};
+
 }  // namespace softarm::test

@@ -39,6 +39,9 @@ TEST(ArmMessages, AStatusComesAsWhatItMeans) {
   EXPECT_EQ(status.frames_rejected, 13);
   EXPECT_EQ(status.overruns, 14);
   EXPECT_EQ(status.messages_malformed, 3);
+  EXPECT_EQ(status.references_refused[5], 15);
+  EXPECT_EQ(status.law_answers[6], 26);
+  EXPECT_FLOAT_EQ(static_cast<float>(status.law_round_trip_s), 0.0015F);
   EXPECT_EQ(status.segments(), 3);
   // pairs(3, first): first, first + 0.25; first + 1, ...
   EXPECT_EQ(status.u_rad, (SegmentVector(6) << 1.0, 1.25, 2.0, 2.25, 3.0, 3.25).finished());

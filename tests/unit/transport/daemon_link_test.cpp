@@ -533,5 +533,103 @@ TEST_F(DaemonLinkOverUdp, AReferenceOfAnotherSizeIsMalformed) {
   }));
 }
 
+/// A link that listens to an external law and to targets of the tip.
+class ExternalLawOverUdp : public DaemonLinkOverUdp {
+ protected:
+  void SetUp() override {
+    settings.control.law = ExternalLaw{};
+    settings.reference.phases = {{LiveTipReference{}, 0.0}};
+    DaemonLinkOverUdp::SetUp();
+    idle = std::make_unique<ControlPipeline>(settings);
+  }
+  law_command_t answer(std::int64_t sequence) const {
+    law_command_t message{.sequence = sequence,
+                          .nonce = link->nonce(now_ns),
+                          .validity_us = 50'000,
+                          .answer = law_command_t::FORCE,
+                          .num_values = 6,
+                          .value = test::numbers<double>(6, 0.25)};
+    return message;
+  }
+  std::int64_t refused(LawVerdict why) const {
+    return link->law_counts(*idle)[static_cast<std::size_t>(why)];
+  }
+  std::unique_ptr<ControlPipeline> idle;
+  static bool came(const TickInput& input) { return input.law != nullptr; }
+};
+
+TEST_F(ExternalLawOverUdp, AnAnswerToARecentStateComesWithTheTimesOfBoth) {
+  const std::string& channel = transport.lcm.law_channel;
+  const std::int64_t state_ns = now_ns;
+  const law_command_t message = answer(1);
+  now_ns += 3'000'000;
+  sender->publish(channel, message);
+  ASSERT_TRUE(collect_until([&](const TickInput& input) {
+    if (!came(input)) return false;
+    EXPECT_EQ(input.law->state_ns, state_ns / 1000 * 1000);
+    EXPECT_EQ(input.law->arrival_ns, now_ns);
+    EXPECT_EQ(input.law->validity_ns, 50'000'000);
+    EXPECT_EQ(input.law->answer, LawAnswer::force);
+    EXPECT_EQ(input.law->values.size(), 6);
+    EXPECT_EQ(input.law->values[5], 1.5);
+    return true;
+  }));
+}
+
+TEST_F(ExternalLawOverUdp, WhatIsOldForeignOrOfAnotherSizeIsRefusedAndCounted) {
+  const std::string& channel = transport.lcm.law_channel;
+  const auto refuses = [&](const law_command_t& message, LawVerdict why) {
+    const std::int64_t before = refused(why);
+    bool heard = false;
+    sender->publish(channel, message);
+    EXPECT_TRUE(collect_until([&](const TickInput& input) {
+      heard |= came(input);
+      return refused(why) == before + 1;
+    })) << name(why);
+    EXPECT_FALSE(heard) << name(why);
+  };
+  const law_command_t old = answer(10);
+  sender->publish(channel, answer(5));
+  ASSERT_TRUE(collect_until(came));
+  refuses(answer(5), LawVerdict::out_of_order);
+  refuses(answer(4), LawVerdict::out_of_order);
+  law_command_t wrong = answer(6);
+  wrong.num_values = 5;
+  wrong.value.resize(5);
+  refuses(wrong, LawVerdict::wrong_size);
+  wrong = answer(6);
+  wrong.answer = law_command_t::PRESSURES;  // of which there are twelve
+  refuses(wrong, LawVerdict::wrong_size);
+  wrong = answer(6);
+  wrong.answer = 7;
+  refuses(wrong, LawVerdict::wrong_size);
+  wrong = answer(6);
+  wrong.nonce += 1'000'000;  // a state that is yet to come
+  refuses(wrong, LawVerdict::not_recent);
+  now_ns += 1'100'000'000;
+  refuses(old, LawVerdict::not_recent);
+  sender->publish(channel, answer(1));  // a law that has started again
+  EXPECT_TRUE(collect_until(came));
+}
+
+TEST_F(ExternalLawOverUdp, ATargetOfTheTipComesOnceAndInOrder) {
+  tip_target_t target = test::example<tip_target_t>(3, 4);
+  const std::string& channel = transport.lcm.tip_channel;
+  const auto came = [](const TickInput& input) { return input.tip_target != nullptr; };
+  sender->publish(channel, target);
+  ASSERT_TRUE(collect_until([&](const TickInput& input) {
+    if (!came(input)) return false;
+    EXPECT_EQ(input.tip_target->position_m, Eigen::Vector3d(0.1, 0.2, -0.3));
+    EXPECT_EQ(input.tip_target->velocity_mps, Eigen::Vector3d(0.4, 0.5, 0.6));
+    return true;
+  }));
+  --target.sequence;
+  sender->publish(channel, target);
+  EXPECT_TRUE(nothing_comes(came)) << "older";
+  now_ns += 600'000'000;  // of silence
+  sender->publish(channel, target);
+  EXPECT_TRUE(collect_until(came));
+}
+
 }  // namespace
 }  // namespace softarm

@@ -38,15 +38,19 @@ std::vector<LengthField> length_fields(const curvature_reference_t&) { return {{
 std::vector<LengthField> length_fields(const valves_status_t&) { return {{64, 2}}; }
 std::vector<LengthField> length_fields(const observer_status_t&) { return {{74, 2}}; }
 std::vector<LengthField> length_fields(const plant_state_t&) { return {{17, 2}, {19, 2}}; }
+std::vector<LengthField> length_fields(const law_state_t&) { return {{41, 2}, {43, 2}}; }
+std::vector<LengthField> length_fields(const law_command_t&) { return {{29, 2}}; }
 std::vector<LengthField> length_fields(const tick_record_t& record) {
-  const auto lists = static_cast<std::size_t>(record.num_chambers + 3 * record.dimension);
+  const auto lists = static_cast<std::size_t>(record.num_chambers + 3 * record.dimension +
+                                              record.num_law + record.num_tip);
   const auto bodies = static_cast<std::size_t>(record.frames.at(0).num_bodies);
   const auto measured = static_cast<std::size_t>(record.num_measured);
-  const std::size_t frame = 84 + 8 * lists + 4 * measured;
-  return {{76, 2}, {78, 2}, {80, 2}, {82, 2}, {frame + 16, 2}, {frame + 18 + 61 * bodies, 4}};
+  const std::size_t frame = 113 + 8 * lists + 4 * measured;
+  return {{101, 2}, {103, 2}, {105, 2},        {107, 2},
+          {109, 2}, {111, 2}, {frame + 16, 2}, {frame + 18 + 61 * bodies, 4}};
 }
 std::vector<LengthField> length_fields(const controller_status_t& status) {
-  const std::size_t counts = 56 + 4 + status.version.size() + 1 + 4 + 4 + 24 + 1;
+  const std::size_t counts = 56 + 4 + status.version.size() + 1 + 4 + 4 + 24 + 1 + 76;
   return {{56, 4}, {counts, 2}, {counts + 2, 2}};
 }
 
@@ -76,7 +80,8 @@ using AllMessages =
     ::testing::Types<mocap_frame_t, pressure_command_t, pressure_measurement_t,
                      curvature_reference_t, operator_command_t, controller_status_t, plant_state_t,
                      timing_t, tick_record_t, valves_status_t, deadman_t, rigid_transform_t,
-                     torque_command_t, observer_status_t>;
+                     torque_command_t, observer_status_t, law_state_t, law_command_t,
+                     tip_target_t>;
 class MessageName {
  public:
   template <class Message>
@@ -167,7 +172,7 @@ TEST(MessageDecoding, TextsThatDoNotEndWhereTheySayAreRefused) {
   const auto status = example<controller_status_t>(3, 4);
   refused(status, length_fields(status)[0].offset, status.version.size());
   const auto record = example<tick_record_t>(3, 4);
-  refused(record, length_fields(record)[5].offset, record.build.size());
+  refused(record, length_fields(record)[7].offset, record.build.size());
 }
 
 // A length beyond this project's capacities is refused even where the bytes are all there.

@@ -124,6 +124,9 @@ inline softarm_messages::controller_status_t example(int segments, int chambers)
   message.flags = 33;
   message.frame_age_s = 0.005F;
   message.messages_malformed = 3;
+  for (int k = 0; k < 10; ++k) message.references_refused[k] = 10 + k;
+  for (int k = 0; k < 8; ++k) message.law_answers[k] = 20 + k;
+  message.law_round_trip_s = 0.0015F;
   message.num_segments = static_cast<std::int16_t>(segments);
   message.num_chambers = static_cast<std::int16_t>(segments * chambers);
   message.u_rad = pairs<float>(segments, 1.0);
@@ -136,6 +139,39 @@ inline softarm_messages::controller_status_t example(int segments, int chambers)
   message.residual_length_m = numbers<float>(segments, 700.0);
   message.pressure_bar = numbers<float>(segments * chambers, 800.0);
   return message;
+}
+
+template <>
+inline softarm_messages::tip_target_t example(int /*segments*/, int /*chambers*/) {
+  return {.sequence = 51, .position_m = {0.1, 0.2, -0.3}, .velocity_mps = {0.4, 0.5, 0.6}};
+}
+
+template <>
+inline softarm_messages::law_state_t example(int segments, int chambers) {
+  const auto dimension = static_cast<std::int16_t>(2 * segments);
+  return {.tick = 19,
+          .time_us = 47,
+          .nonce = -48,
+          .mode = 2,
+          .active_s = 0.25,
+          .dimension = dimension,
+          .num_chambers = static_cast<std::int16_t>(segments * chambers),
+          .u_rad = numbers<double>(dimension, 0.1),
+          .velocity_radps = numbers<double>(dimension, 100.1),
+          .reference_u_rad = numbers<double>(dimension, 200.1),
+          .reference_velocity_radps = numbers<double>(dimension, 300.1),
+          .reference_acceleration_radps2 = numbers<double>(dimension, -300.1),
+          .pressure_bar = numbers<float>(segments * chambers, 800.0)};
+}
+
+template <>
+inline softarm_messages::law_command_t example(int segments, int chambers) {
+  return {.sequence = 49,
+          .nonce = -50,
+          .validity_us = 50'000,
+          .answer = softarm_messages::law_command_t::PRESSURES,
+          .num_values = static_cast<std::int16_t>(segments * chambers),
+          .value = numbers<double>(segments * chambers, 0.5)};
 }
 
 template <>
@@ -219,6 +255,11 @@ inline softarm_messages::tick_record_t example(int segments, int chambers) {
       {.frame_number = 5, .capture_ns = 6, .num_bodies = frame.num_bodies, .bodies = frame.bodies});
   message.num_measured = message.num_chambers;
   message.measured_bar = numbers<float>(message.num_chambers, 4000.0);
+  message.law_answer = segments < 10 ? softarm_messages::law_command_t::FORCE : std::int8_t{-1};
+  message.num_law = message.dimension;
+  message.law_value = numbers<double>(message.num_law, -0.5);
+  message.num_tip = segments < 10 ? 6 : 0;
+  message.tip_target = numbers<double>(message.num_tip, -1.5);
   message.build = "softarm 0.1.0 commit 0123456789-dirty";
   message.digest = -7;
   return message;

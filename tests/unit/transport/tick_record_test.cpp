@@ -50,9 +50,9 @@ bool same_bits(const A& a, const B& b, std::size_t count) {
 void expect_same(const TickInput& a, const TickInput& b) {
   // A new field of TickInput stops the build here too: it belongs into this test.
   const auto& [now_a, frames_a, reference_a, requests_a, expired_a, paused_a, overruns_a,
-               measurement_a, measured_a, go_a, foreign_a] = a;
+               measurement_a, tip_a, law_a, measured_a, go_a, foreign_a] = a;
   const auto& [now_b, frames_b, reference_b, requests_b, expired_b, paused_b, overruns_b,
-               measurement_b, measured_b, go_b, foreign_b] = b;
+               measurement_b, tip_b, law_b, measured_b, go_b, foreign_b] = b;
   const auto& [arm_a, disarm_a, stop_a, shutdown_a, lost_a] = requests_a;
   const auto& [arm_b, disarm_b, stop_b, shutdown_b, lost_b] = requests_b;
   EXPECT_EQ(now_a, now_b);
@@ -67,6 +67,22 @@ void expect_same(const TickInput& a, const TickInput& b) {
   EXPECT_EQ(go_a, go_b);
   EXPECT_EQ(foreign_a, foreign_b);
   EXPECT_EQ(lost_a, lost_b);
+  ASSERT_EQ(tip_a == nullptr, tip_b == nullptr);
+  if (tip_a != nullptr) {
+    EXPECT_TRUE(same_bits(tip_a->position_m, tip_b->position_m, 3));
+    EXPECT_TRUE(same_bits(tip_a->velocity_mps, tip_b->velocity_mps, 3));
+  }
+  ASSERT_EQ(law_a == nullptr, law_b == nullptr);
+  if (law_a != nullptr) {
+    const auto& [state_a, arrival_a, validity_a, answer_a, values_a] = *law_a;
+    const auto& [state_b, arrival_b, validity_b, answer_b, values_b] = *law_b;
+    EXPECT_EQ(state_a, state_b);
+    EXPECT_EQ(arrival_a, arrival_b);
+    EXPECT_EQ(validity_a, validity_b);
+    EXPECT_EQ(answer_a, answer_b);
+    ASSERT_EQ(values_a.size(), values_b.size());
+    EXPECT_TRUE(same_bits(values_a, values_b, static_cast<std::size_t>(values_a.size())));
+  }
   ASSERT_EQ(measured_a == nullptr, measured_b == nullptr);
   if (measured_a != nullptr) {
     ASSERT_EQ(measured_a->size(), measured_b->size());
@@ -102,6 +118,7 @@ PipelineSettings arm_of(int segments) {
   PipelineSettings settings;
   settings.arm.segments.resize(static_cast<std::size_t>(segments));
   settings.actuation.segments.assign(static_cast<std::size_t>(segments), std::vector<Chamber>(4));
+  settings.control.law = ExternalLaw{};
   return settings;
 }
 
@@ -140,6 +157,17 @@ TEST(TickRecord, AnyInputComesBackBitForBit) {
       const PressureVector measured =
           PressureVector::Random(4 * segments).cast<float>().cast<double>();
       if (k % 4 == 0) input.measured_bar = &measured;
+      LawInput law{any.integer(),
+                   any.integer(),
+                   any.integer(),
+                   k % 6 == 0 ? LawAnswer::pressures : LawAnswer::force,
+                   {}};
+      law.values.resize(law.answer == LawAnswer::pressures ? 4 * segments : 2 * segments);
+      for (double& each : law.values) each = any.number();
+      if (k % 3 == 0) input.law = &law;
+      const auto place = [&] { return Eigen::Vector3d(any.number(), any.number(), any.number()); };
+      const TipTargetInput target{place(), place()};
+      if (k % 5 == 0) input.tip_target = &target;
       const PressureVector command = PressureVector::Random(4 * segments);
 
       const auto bytes = recorder.record(k, input, command);
@@ -204,6 +232,12 @@ TEST(TickRecord, TheFullestRecordFits) {
     TickInput input;
     input.frames = frames;
     input.reference = &reference;
+    LawInput law;
+    law.answer = LawAnswer::pressures;
+    law.values.setZero(4 * segments);
+    input.law = &law;
+    const TipTargetInput target{Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()};
+    input.tip_target = &target;
     const auto bytes = recorder.record(1, input, PressureVector::Zero(4 * segments));
     tick_record_t record{};
     EXPECT_TRUE(decode(bytes, record)) << segments;

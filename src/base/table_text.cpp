@@ -1,4 +1,4 @@
-#include "recording/table_text.hpp"
+#include "softarm/base/table_text.hpp"
 
 #include <fmt/format.h>
 

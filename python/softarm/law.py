@@ -1,0 +1,142 @@
+"""A control law of one's own, the same class in simulation and live.
+
+    class OwnLaw:
+        def __init__(self, experiment): ...
+        def compute(self, state): return force    # (2n,), N m: generalized force in u
+
+`state` is a softarm.LawState. A law may also have
+
+    gives = "pressures"     # then compute returns set points of all chambers, (chambers,), bar
+    validity_s = 0.05       # how long an answer may be held without a newer one
+    def reset(self): ...    # the arm becomes ACTIVE
+
+In simulation, in lock step and deterministic: `softarm run --law own_law.py:OwnLaw CONFIG`, or
+softarm.run(experiment, duration_s, law=OwnLaw(experiment)). Live, beside a softarmd whose experiment has
+`control: {law: external}`:
+
+    softarm law own_law.py:OwnLaw CONFIG
+
+The daemon keeps frames, safety and limits. Where the law falls silent or raises, it holds and then vents.
+"""
+
+import argparse
+import importlib
+import importlib.util
+import pathlib
+import socket
+import sys
+import time
+
+import numpy as np
+
+import softarm
+from softarm import _core
+
+
+class Answers:
+    """Asks a law and checks what it gives: state -> (values, whether these are pressures, validity in s)."""
+
+    def __init__(self, law, experiment):
+        self._law = law
+        gives = getattr(law, "gives", "force")
+        if gives not in ("force", "pressures"):
+            raise ValueError(f"gives: expected 'force' or 'pressures', got {gives!r}")
+        self._pressures = gives == "pressures"
+        self._size = sum(experiment.chambers) if self._pressures else 2 * experiment.segments
+        self._validity_s = float(getattr(law, "validity_s", 0.05))
+        self._active = False
+
+    def __call__(self, state):
+        active = state.mode == "ACTIVE"
+        if active and not self._active and hasattr(self._law, "reset"):
+            self._law.reset()
+        self._active = active
+        values = np.asarray(self._law.compute(state), dtype=float)
+        if values.shape != (self._size,):
+            raise ValueError(f"compute: expected {self._size} numbers, got an array of shape {values.shape}")
+        if not np.isfinite(values).all():
+            raise ValueError(f"compute: expected finite numbers, got {values}")
+        return values, self._pressures, self._validity_s
+
+
+def load(name):
+    """The class that MODULE:CLASS or FILE.py:CLASS names."""
+    where, _, what = name.rpartition(":")
+    if not where or not what:
+        raise ValueError(f"law: expected MODULE:CLASS or FILE.py:CLASS, got {name!r}")
+    if where.endswith(".py"):
+        path = pathlib.Path(where)
+        if not path.exists():
+            raise FileNotFoundError(f"{where}: no such file")
+        spec = importlib.util.spec_from_file_location(path.stem, path)
+        module = importlib.util.module_from_spec(spec)
+        sys.modules[path.stem] = module
+        spec.loader.exec_module(module)
+    else:
+        sys.path.insert(0, "")
+        module = importlib.import_module(where)
+    return getattr(module, what)
+
+
+def answer_socket(answers, connection):
+    """In lock step: one answer to each state, until the other end closes."""
+    while data := connection.recv(65536):
+        state = _core._decode_law_state(data)
+        connection.send(_core._encode_law_answer(state, *answers(state)))
+
+
+def answer_daemon(answers, experiment, duration_s=None):
+    """Answers a running softarmd until `duration_s` have passed, or for ever. Returns the statistics of ACTIVE: a dict."""
+    client = softarm.ArmClient(experiment)
+    end = None if duration_s is None else time.monotonic() + duration_s
+    squares, count, silent = 0.0, 0, False
+    while end is None or time.monotonic() < end:
+        state = client.wait_for_law_state(0.5)
+        if state is None:
+            if not silent:
+                print("softarm law: no state to answer: is softarmd running, with control.law: external, and its frames?",
+                      file=sys.stderr, flush=True)
+            silent = True
+            continue
+        silent = False
+        client.answer_law(state, *answers(state))
+        if state.mode == "ACTIVE":
+            squares += float(np.mean((state.u_ref - state.u) ** 2))
+            count += 1
+    status = client.status
+    return {
+        "answers": count,
+        "error_rms_rad": (squares / count) ** 0.5 if count else float("nan"),
+        "round_trip_s": status.law_round_trip_s if status else float("nan"),
+    }
+
+
+def main(arguments=None):
+    parser = argparse.ArgumentParser(prog="softarm law", description="A control law for a running softarmd")
+    parser.add_argument("law", help="MODULE:CLASS or FILE.py:CLASS")
+    parser.add_argument("config", help="experiment in YAML, with control.law: external")
+    parser.add_argument("--duration", type=float, help="s; left out: until it is ended")
+    parser.add_argument("--socket", type=int, help=argparse.SUPPRESS)  # of softarm run
+    options = parser.parse_args(arguments)
+    try:
+        experiment = softarm.load_experiment(options.config)
+        answers = Answers(load(options.law)(experiment), experiment)
+        if options.socket is not None:
+            answer_socket(answers, socket.socket(fileno=options.socket))
+            return 0
+        done = answer_daemon(answers, experiment, options.duration)
+    except softarm.ConfigError as error:
+        print(f"softarm law: {error}", file=sys.stderr)
+        return 78
+    except (OSError, ImportError, AttributeError, softarm.TransportError) as error:
+        print(f"softarm law: {error}", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        return 0
+    print(f"{done['answers']} answers while ACTIVE, error of u {1e3 * done['error_rms_rad']:.2f} mrad rms, "
+          f"newest round trip {1e3 * done['round_trip_s']:.2f} ms")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
