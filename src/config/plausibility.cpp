@@ -192,9 +192,9 @@ OutOfReach out_of_reach(const Experiment& experiment, const TipPath& path) {
   Eigen::VectorXd bend(experiment.arm.size());
   OutOfReach out;
   for (int k = 0; k < path.instants; ++k) {
-    const double away_m = distance_out_of_reach_m(experiment.arm, experiment.control.max_theta_rad,
-                                                  experiment.actuation.plane_rad, path.at(k), u,
-                                                  stretch_m);
+    const double away_m =
+        distance_out_of_reach_m(experiment.arm, experiment.control.max_theta_rad,
+                                experiment.actuation.plane_rad, path.at(k), u, stretch_m);
     out.longest_m = std::max(out.longest_m, away_m);
     if (away_m > kReachTolerance * length_m(experiment.arm)) {
       out.part += 1.0 / path.instants;

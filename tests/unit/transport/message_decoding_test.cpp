@@ -80,8 +80,7 @@ using AllMessages =
     ::testing::Types<mocap_frame_t, pressure_command_t, pressure_measurement_t,
                      curvature_reference_t, operator_command_t, controller_status_t, plant_state_t,
                      timing_t, tick_record_t, valves_status_t, deadman_t, rigid_transform_t,
-                     torque_command_t, observer_status_t, law_state_t, law_command_t,
-                     tip_target_t>;
+                     torque_command_t, observer_status_t, law_state_t, law_command_t, tip_target_t>;
 class MessageName {
  public:
   template <class Message>
