@@ -56,8 +56,8 @@ OutputMessages::OutputMessages(const PipelineSettings& settings, const Provenanc
     : pressure_command{},
       torque_command{},
       status{},
-      law_state{},
       observer{},
+      law_state{},
       width_(settings.arm.segment_dof()),
       by_torque_(settings.actuation.kind == ActuationKind::torque) {
   const auto segments = static_cast<std::size_t>(settings.arm.size());

@@ -6,6 +6,7 @@
 
 #include "apps/program.hpp"
 #include "apps/signals.hpp"
+#include "apps/softarmd/loop_reports.hpp"
 #include "softarm/base/fault_latch.hpp"
 #include "softarm/base/instance_lock.hpp"
 #include "softarm/base/line_log.hpp"
@@ -15,7 +16,6 @@
 #include "softarm/base/version.hpp"
 #include "softarm/config/load.hpp"
 #include "softarm/transport/daemon_loop.hpp"
-#include "softarm/transport/input_report.hpp"
 #include "softarm/transport/lcm_node.hpp"
 #include "softarm/transport/settings.hpp"
 
@@ -75,55 +75,9 @@ class Latched {
 /// Prints every change of mode or reason, and what was refused; reports to the service manager.
 void run(DaemonLoop& loop, LineLog& log, ServiceNotifier& service, const LcmSettings& lcm,
          Latched* latched) {
-  constexpr std::int64_t kRefused_ns = 1'000'000'000;  // malformed messages may come at any rate
   Mode mode = Mode::init;
   Reason reason = Reason::none;
-  std::int64_t refused = 0, left_out = 0, refused_reported_ns = kNever;
-  const auto report_refused = [&](std::int64_t now_ns) {
-    const std::int64_t total = loop.link().malformed();
-    const std::int64_t total_left_out = loop.pipeline().frames_left_out();
-    if (now_ns < refused_reported_ns + kRefused_ns) return;
-    if (total != refused)
-      log.add("{} malformed messages refused, {} in all", total - refused, total);
-    if (total_left_out != left_out)
-      log.add("{} frames too many in one tick for the observer, {} in all",
-              total_left_out - left_out, total_left_out);
-    if (total != refused || total_left_out != left_out) refused_reported_ns = now_ns;
-    refused = total;
-    left_out = total_left_out;
-  };
-  InputReport report_inputs;
-  const auto report_streams = [&](std::int64_t now_ns) {
-    const InputReport::Counts counts{
-        .mode = mode,
-        .frames = loop.pipeline().counters(),
-        .late_frames = loop.pipeline().late_frames(),
-        .frame_channel = lcm.mocap_channel,
-        .measurements = {lcm.measurement_channel, loop.link().backward_measurements()},
-        .references = {lcm.reference_channel, loop.link().backward_references()},
-        .live = loop.link().live_counts(loop.pipeline()),
-        .answers = loop.link().law_counts(loop.pipeline())};
-    for (const auto report : {&InputReport::refusals, &InputReport::refused_references,
-                              &InputReport::refused_answers, &InputReport::second_sender})
-      if (const auto text = (report_inputs.*report)(now_ns, counts); !text.empty())
-        log.add("{}", text);
-  };
-  std::optional<MocapStanding> standing;
-  const auto report_mocap = [&] {
-    if (std::exchange(standing, loop.link().mocap_standing()) != standing)
-      log.add("motion capture: {} {}", standing->text(), standing->body);
-  };
-  std::int32_t held_us = loop.link().asked_us();
-  const auto report_validity = [&] {
-    if (loop.link().held_us() == held_us) return;
-    held_us = loop.link().held_us();
-    if (held_us < loop.link().asked_us())
-      log.add(
-          "commands are valid for {:.3g} s (daemon.lcm.command_validity_s), but the valve side "
-          "lets "
-          "them expire after {:.3g} s",
-          1e-6 * loop.link().asked_us(), 1e-6 * held_us);
-  };
+  LoopReports reports(loop, lcm, log);
   loop.run([] { return stop_requested != 0; },
            [&](const DaemonLoop::Report& report) {
              const TickOutput& output = loop.pipeline().output();
@@ -135,16 +89,13 @@ void run(DaemonLoop& loop, LineLog& log, ServiceNotifier& service, const LcmSett
                log.add("{:.3f} s: {} ({}{}{})", to_seconds(report.since_start_ns), name(mode),
                        name(reason), verdict ? ": " : "", verdict ? name(output.refusal) : "");
              }
-             report_refused(report.woken_ns);
-             report_streams(report.woken_ns);
-             report_mocap();
-             report_validity();
+             reports.report(report.woken_ns, mode);
              service.report(report.woken_ns, {.state = name(mode),
                                               .reason = name(reason),
                                               .on_time = report.on_time,
                                               .stopping = report.stopping});
            });
-  report_refused(kForever);
+  reports.report_refused(kForever);
 }
 
 int serve(const std::string& path, bool shadow) {
