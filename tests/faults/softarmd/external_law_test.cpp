@@ -34,7 +34,7 @@ TEST_P(ExternalLawFaults, ItMovesTheArmAndItsSilenceHoldsAndVents) {
   const auto law = start_law();
   ASSERT_TRUE(wait_for([&] { return under_pressure(); })) << seen_text() << law->printed();
   EXPECT_TRUE(stays_active(*this));
-  EXPECT_GT(status_.law_answers[0], 100);
+  EXPECT_GT(status_.law_answers[0], 20);
   EXPECT_GT(status_.law_round_trip_s, 0.0);
 
   forget();
@@ -47,7 +47,9 @@ TEST_P(ExternalLawFaults, ItMovesTheArmAndItsSilenceHoldsAndVents) {
   EXPECT_TRUE(wait_for([&] { return under_pressure(); })) << seen_text();
   law->signal(SIGKILL);
   EXPECT_TRUE(becomes(*this, Mode::vent, Reason::law_silent)) << seen_text();
-  expect_limits(*this);
+  EXPECT_TRUE(all_finite_);
+  EXPECT_GE(lowest_bar_, 0.0);
+  EXPECT_LE(highest_bar_, load_experiment(config_.string()).actuation.max_pressure_bar);
 }
 
 TEST_P(ExternalLawFaults, ARecordThatIsPlayedMovesNothing) {
