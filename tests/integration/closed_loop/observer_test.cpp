@@ -266,19 +266,6 @@ TEST(ArmsOfEveryKind, AreTrackedWithTheObserver) {
   EXPECT_LT(error_of(point), 2e-3);
 }
 
-TEST(WrongModel, AParameterAtItsLimitIsAFault) {
-  Experiment e = observed("as configured");
-  for (SegmentParameters& segment : e.plant.arm.segments) segment.stiffness_nm_per_rad *= 4.0;
-  Loop loop(e);
-  bool warned = false;
-  while (loop.time_s() < 20.0 && loop.pipeline.output().mode != Mode::fault) {
-    loop.tick();
-    warned |= loop.pipeline.output().wrong_model;
-  }
-  EXPECT_TRUE(warned);
-  EXPECT_EQ(loop.pipeline.output().reason, Reason::wrong_model);
-}
-
 TEST(ObserverSlow, NoFalseContactInAnHourOfTheReference) {
   Experiment e = pushed("mismatch 5 %", Eigen::Vector3d::Zero(), 1.0);
   Loop loop(e);
