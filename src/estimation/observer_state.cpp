@@ -297,8 +297,10 @@ bool ModelObserver::State::correct_group(ErrorCovariance<k>& errors, int first,
 
 void ModelObserver::State::limit_corrections() noexcept {
   at_limit = false;
+  // What is pushed against a limit stays near it, not on it.
+  constexpr double kNear = 0.95;
   const auto limit = [this](double& value, double low, double high) {
-    at_limit |= !(value > low && value < high);
+    at_limit |= !(value > kNear * low && value < kNear * high);
     value = std::clamp(value, low, high);
   };
   for (int i = 0; i < arm.size(); ++i) {
