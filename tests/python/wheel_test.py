@@ -11,7 +11,7 @@ import venv
 import zipfile
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-build, version = pathlib.Path(sys.argv[1]), sys.argv[2]
+build, version = pathlib.Path(sys.argv[1]).resolve(), sys.argv[2]
 
 IN_THE_WHEEL = """
 import importlib.metadata, pathlib, sys

@@ -29,7 +29,7 @@ class Soromox:
         self.version = self._worker.stdout.readline().strip()
 
     def ask(self, u, velocity, calls):
-        """u'', and the processor time of a call in us, of all threads, and the clock's."""
+        """u'', and the processor time of a call in us, of all threads, and the clock's of the quickest."""
         self._worker.stdin.write(json.dumps([u.tolist(), velocity.tolist(), calls]) + "\n")
         answer = json.loads(self._worker.stdout.readline())
         return np.array(answer["acceleration"]), answer["us"], answer["wall_us"]
@@ -83,12 +83,14 @@ def serve_soromox():
     for line in sys.stdin:
         u, velocity, calls = json.loads(line)
         state = jnp.concatenate([jnp.asarray(curvature(np.array(u))), jnp.asarray(curvature(np.array(velocity)))])
-        begin, wall = time.process_time(), time.perf_counter()
+        begin, best_s = time.process_time(), float("inf")
         for _ in range(calls):
+            called = time.perf_counter()
             out = forward(state).block_until_ready()
-        us, wall_us = 1e6 * (time.process_time() - begin) / calls, 1e6 * (time.perf_counter() - wall) / calls
+            best_s = min(best_s, time.perf_counter() - called)
+        us = 1e6 * (time.process_time() - begin) / calls
         bent = np.asarray(out)[2 * SEGMENTS :] * LENGTH_M
-        print(json.dumps({"acceleration": np.column_stack([bent[1::2], -bent[::2]]).ravel().tolist(), "us": us, "wall_us": wall_us}), flush=True)
+        print(json.dumps({"acceleration": np.column_stack([bent[1::2], -bent[::2]]).ravel().tolist(), "us": us, "wall_us": 1e6 * best_s}), flush=True)
 
 
 def timed_us(call, calls, clock=time.process_time):
@@ -147,7 +149,7 @@ def measure(config, seconds, cpp, soromox_python):
             _, processor_us, wall_us = soromox.ask(u, velocity, 50)
             rows["soromox"].append(processor_us)
             rows["soromox wall"].append(wall_us)
-            rows["forward wall"].append(timed_us(lambda: arm.forward_dynamics(u, velocity, force), 500, time.perf_counter))
+            rows["forward wall"].append(timed_us(lambda: arm.forward_dynamics(u, velocity, force), 20, time.perf_counter))
         for name, threads in (("one thread", 1), ("two threads", 2)):
             rows[name].append(timed_us(lambda: softarm.advance(plants, 0.2, commands, threads=threads), 1, time.perf_counter))
     if soromox:
@@ -186,7 +188,7 @@ def table(r):
     if "soromox" in r:
         lines.append(
             f"forward dynamics of {r['soromox']}: {r['soromox_us']:.1f} us, {r['soromox_over_forward']:.0f} times ours"
-            f" ({r['soromox_over_forward_best_wall']:.0f} times by the clock, each side's best round);"
+            f" ({r['soromox_over_forward_best_wall']:.0f} times by the clock, the quickest calls of each);"
             f" the same arm to {r['difference']:.1e}"
         )
     lines.append(f"{PLANTS} simulated arms, two threads over one: {r['two_threads_over_one']:.2f}")
