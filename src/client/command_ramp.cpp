@@ -43,7 +43,7 @@ double CommandRamp::step_s(std::int64_t now_ns) {
 
 void CommandRamp::interrupt() {
   bar_.setZero();
-  held_up_ = true;
+  if (sent_ns_ != kNever) held_up_ = true;  // else the valves vented after another's commands
 }
 
 const softarm_messages::pressure_command_t& CommandRamp::next(std::int64_t now_ns) {

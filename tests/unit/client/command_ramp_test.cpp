@@ -87,6 +87,16 @@ TEST(CommandRamp, AfterAnExpiryItBeginsAtZeroAndSaysSo) {
   EXPECT_TRUE(ramp.held_up());
 }
 
+/// A program that begins while the last command of another one expires has not been held up.
+TEST(CommandRamp, ValvesThatVentBeforeTheFirstCommandDoNotCount) {
+  CommandRamp ramp(two_chambers(), kValidity_s);
+  ramp.interrupt();
+  EXPECT_FALSE(ramp.held_up());
+  ramp.next(kMs);
+  ramp.interrupt();
+  EXPECT_TRUE(ramp.held_up());
+}
+
 TEST(CommandRamp, AShortValidityIsRefreshedFourTimes) {
   CommandRamp ramp(two_chambers(), 0.008);
   ramp.next(kMs);

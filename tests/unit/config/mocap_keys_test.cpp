@@ -104,5 +104,35 @@ TEST_F(MocapKeys, EveryBodyHasItsOwnChannel) {
   EXPECT_THROW(load_experiment(folder.write("e.yaml", text)), ConfigError);
 }
 
+TEST_F(MocapKeys, AServerHasAnAddressAndItsBodiesHaveNames) {
+  const auto named = [&](const char* mocap, const char* bodies) {
+    std::string text = with_bodies(bodies);
+    text.replace(text.find("  bodies:"), 0, mocap);
+    return load_experiment(folder.write("e.yaml", text)).transport;
+  };
+  TransportSettings transport =
+      named("  mocap: {source: natnet, host: 10.0.0.7, multicast: 239.255.42.99}\n",
+            "    base_plate: {name: base}\n    segment_plates: [{name: a}, {name: b}]\n");
+  EXPECT_EQ(transport.mocap.network.host, "10.0.0.7");
+  EXPECT_EQ(transport.mocap.network.port, 1510);
+  EXPECT_EQ(transport.mocap.network.data_port, 1511);
+  EXPECT_EQ(transport.mocap.unit, LengthUnit::metre);
+  EXPECT_EQ(transport.mocap.quaternion, QuaternionOrder::xyzw);
+  EXPECT_EQ(transport.bodies.segment_marker_frames[1].name, "b");
+  transport = load("  mocap: {source: qtm, host: 10.0.0.7}\n").transport;
+  EXPECT_EQ(transport.mocap.network.port, 22223);
+  EXPECT_EQ(transport.mocap.unit, LengthUnit::millimetre);
+  EXPECT_EQ(transport.bodies.segment_marker_frames[1].name, "") << "by its place in the list";
+
+  EXPECT_NE(complaint("  mocap: {source: qtm, host: motive.lab}\n").find("an IPv4 address"),
+            std::string::npos);
+  EXPECT_NE(complaint("  mocap: {source: natnet, version: four}\n").find("two numbers"),
+            std::string::npos);
+  EXPECT_NE(complaint("  mocap: {source: qtm, multicast: 239.255.42.99}\n").find("multicast"),
+            std::string::npos);
+  EXPECT_THROW(named("  mocap: {source: natnet}\n", "    segment_plates: [{name: a}, {name: a}]\n"),
+               ConfigError);
+}
+
 }  // namespace
 }  // namespace softarm
