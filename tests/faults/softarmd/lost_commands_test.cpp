@@ -1,36 +1,11 @@
 // Commands are lost between the daemon and its valves for longer than they are valid, or than the
 // valve side grants: the valves vent, and the daemon does not fill them again by itself.
-#include <atomic>
-#include <thread>
-
 #include "faults/softarmd/fault_test.hpp"
-#include "softarm/base/clock.hpp"
-#include "softarm/transport/lcm_node.hpp"
 
 namespace softarm {
 namespace {
 
 using test::FaultTest;
-
-/// Passes commands on from the daemon's channel to the valves', or loses them.
-class CommandRelay {
- public:
-  /// @param priority SCHED_FIFO, so that a busy machine loses no commands; 0: none
-  CommandRelay(const std::string& url, int priority) : node_(url) {
-    node_.subscribe("SOFTARM_PRESSURE_COMMAND", 64, [this](const ReceivedMessage& packet) {
-      if (!loses) node_.publish_encoded("VALVES_COMMAND", packet.bytes);
-    });
-    thread_ = std::jthread([this, priority](const std::stop_token& stop) {
-      if (priority > 0) apply_realtime_settings({.fifo = true, .priority = priority});
-      while (!stop.stop_requested()) node_.wait_until(monotonic_now_ns() + 10'000'000);
-    });
-  }
-  std::atomic<bool> loses{false};
-
- private:
-  LcmNode node_;
-  std::jthread thread_;
-};
 
 class LostCommands : public FaultTest {
  protected:
@@ -45,7 +20,8 @@ class LostCommands : public FaultTest {
     lcm_.clear();
     validity_s_ = asked_s;
     configure(*this, ", arming: explicit");
-    CommandRelay relay(url_, loaded() ? test::kPlantPriority : 0);
+    FaultRelay relay(load_experiment(config_.string()).transport.lcm, "_NOBODY",
+                     loaded() ? test::kPlantPriority : 0, "VALVES_COMMAND");
     const auto daemon = start("softarmd");
     ASSERT_TRUE(wait_for([&] { return reason() == Reason::waiting_for_arm; })) << daemon->printed();
     EXPECT_EQ(client_->request(OperatorRequest::arm), RequestOutcome::done) << daemon->printed();
@@ -59,9 +35,9 @@ class LostCommands : public FaultTest {
     }
 
     forget();
-    relay.loses = true;
+    relay.lose_commands(true);
     ASSERT_TRUE(wait_for([&] { return plant_.vented; })) << plant->printed();
-    relay.loses = false;
+    relay.lose_commands(false);
     EXPECT_TRUE(wait_for([&] { return saw(Mode::vent, Reason::command_expired); })) << seen_text();
     EXPECT_TRUE(becomes(*this, Mode::vent, Reason::waiting_for_arm))
         << seen_text() << daemon->printed();

@@ -1,5 +1,5 @@
 // The machine of the daemon is suspended: CLOCK_MONOTONIC stands still, CLOCK_BOOTTIME goes on.
-#include "faults/preloaded_clocks.hpp"
+#include "dev/clock/preloaded_clocks.hpp"
 #include "faults/softarmd/fault_test.hpp"
 
 namespace softarm {
@@ -14,7 +14,7 @@ TEST_P(Pauses, ASuspendedDaemonVentsAndWithExplicitArmingWaitsForAPerson) {
   GTEST_SKIP() << "a sanitizer's runtime must be loaded first";
 #endif
   configure(*this, ", arming: explicit");
-  test::PreloadedClocks clocks((folder_ / "clocks").string());
+  PreloadedClocks clocks((folder_ / "clocks").string());
   ASSERT_TRUE(clocks.made());
   const auto plant = start_plant(*this);
   std::vector<std::string> arguments = clocks.preload();

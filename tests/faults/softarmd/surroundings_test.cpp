@@ -1,6 +1,6 @@
 // Disturbances from outside: the wall clock of the daemon's machine is set, a person leans on the
 // arm.
-#include "faults/preloaded_clocks.hpp"
+#include "dev/clock/preloaded_clocks.hpp"
 #include "faults/softarmd/fault_test.hpp"
 
 namespace softarm {
@@ -21,7 +21,7 @@ TEST_P(Surroundings, AWallClockThatIsSetDisturbsNothing) {
       "paper_arm.yaml",
       "  safety: {hold_after_s: 1, vent_after_s: 2, max_latency_s: 0.5, good_frames: 20}\n" +
           realtime());
-  test::PreloadedClocks clock((folder_ / "wall_clock").string());
+  PreloadedClocks clock((folder_ / "wall_clock").string());
   ASSERT_TRUE(clock.made());
   const auto plant = start_plant(*this);
   std::vector<std::string> arguments = clock.preload();

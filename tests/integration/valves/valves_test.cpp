@@ -9,7 +9,7 @@
 #include <functional>
 #include <regex>
 
-#include "faults/preloaded_clocks.hpp"
+#include "dev/clock/preloaded_clocks.hpp"
 #include "integration/valves/relay.hpp"
 #include "integration/valves/valves_program.hpp"
 
@@ -198,7 +198,7 @@ TEST_F(ValvesBehindARelay, AStoppedAndContinuedDriverVents) {
 class ValvesOnPausedMachines : public ValvesBehindARelay {
  protected:
   void begin_on_set_clocks() {
-    clocks_ = std::make_unique<test::PreloadedClocks>((folder_ / "clocks").string());
+    clocks_ = std::make_unique<PreloadedClocks>((folder_ / "clocks").string());
     ASSERT_TRUE(clocks_->made());
     begin();
     driver_.reset();
@@ -207,7 +207,7 @@ class ValvesOnPausedMachines : public ValvesBehindARelay {
     driver_ = start("/env", arguments);
     ASSERT_TRUE(run_at(0.3)) << driver_->printed();
   }
-  std::unique_ptr<test::PreloadedClocks> clocks_;
+  std::unique_ptr<PreloadedClocks> clocks_;
 };
 
 TEST_F(ValvesOnPausedMachines, ASuspendVents) {

@@ -180,11 +180,24 @@ TEST_F(Expiry, NegativeCountsAreRefused) {
   EXPECT_NO_THROW(CommandExpiry(0));
 }
 
-TEST_F(Expiry, TheSendersClockMayBeCoarse) {
-  PressureCommand first = command(1), next = command(2);
-  first.sent_us = next.sent_us = 5'000;
-  EXPECT_EQ(expiry.receive(first, 0), CommandVerdict::in_force);
-  EXPECT_EQ(expiry.receive(next, 1 * kMs), CommandVerdict::in_force);
+TEST_F(Expiry, TheSendersClockMayBeCoarseAndThePacketLate) {
+  constexpr std::int64_t kDelay_us = 500'000, kNow_us = 1'000'000'000;
+  const auto verdict = [this](std::int64_t sequence, std::int64_t sent_us) {
+    CommandExpiry fresh(2);
+    PressureCommand first = command(5), other = command(sequence);
+    first.sent_us = kNow_us;
+    other.sent_us = sent_us;
+    EXPECT_EQ(fresh.receive(first, 0), CommandVerdict::in_force);
+    return fresh.receive(other, 1 * kMs);
+  };
+  EXPECT_EQ(verdict(6, kNow_us), CommandVerdict::in_force) << "its clock stands";
+  EXPECT_EQ(verdict(6, kNow_us - 1), CommandVerdict::other_sender);
+  EXPECT_EQ(verdict(6, kNow_us + 1'000 + kDelay_us), CommandVerdict::in_force);
+  EXPECT_EQ(verdict(6, kNow_us + 1'001 + kDelay_us), CommandVerdict::other_sender);
+  EXPECT_EQ(verdict(4, kNow_us), CommandVerdict::older);
+  EXPECT_EQ(verdict(4, kNow_us + 1), CommandVerdict::other_sender);
+  EXPECT_EQ(verdict(4, kNow_us - kDelay_us), CommandVerdict::older);
+  EXPECT_EQ(verdict(4, kNow_us - kDelay_us - 1), CommandVerdict::other_sender);
 }
 
 }  // namespace

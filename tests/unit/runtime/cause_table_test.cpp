@@ -353,6 +353,26 @@ TEST(ActivatedTooOften, WhereAnOperatorArmsEveryTimeItIsTheOperatorsDecision) {
   }
 }
 
+TEST(ActivatedTooOften, TheMinuteHasItsLastInstant) {
+  Bench active(Arming::automatic), vented(Arming::automatic);
+  active.activate();
+  vented.activate();
+  vented.frames = false;
+  ASSERT_EQ(vented.run(80), Mode::vent);
+  SafetySettings settings;
+  settings.most_activations = 2;
+  ActivationLimit limit(settings);
+  constexpr std::int64_t kBegin = 7 * kMs, kMinute = 60'000 * kMs;
+  limit.note(kBegin, Mode::vent, false, active.monitor);
+  limit.note(kBegin + kMinute, Mode::vent, false, active.monitor);
+  EXPECT_TRUE(limit.reached(kBegin + kMinute, vented.monitor));
+  EXPECT_FALSE(limit.reached(kBegin + kMinute + 1, vented.monitor));
+}
+
+TEST(SafetyInput, AssumesPressureUntilSomebodyHasLooked) {
+  EXPECT_FALSE(SafetyInput{}.fully_vented);
+}
+
 TEST(Refused, FramesThatComeAndAreRefusedAreNamedSo) {
   Bench bench(Arming::automatic);
   bench.frames = false;

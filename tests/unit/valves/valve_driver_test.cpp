@@ -30,7 +30,7 @@ class NamedBackend : public test::FakeBackend {
 const ValveBackendRegistration<NamedBackend> kRegistration("fake");
 
 using test::kMs;
-constexpr std::int64_t kPeriod = 5 * kMs;
+constexpr std::int64_t kDriverPeriod = 5 * kMs;
 
 class Driver : public ::testing::Test {
  protected:
@@ -44,7 +44,7 @@ class Driver : public ::testing::Test {
                                            [this] { return now; });
   }
   bool cycle() {
-    now += kPeriod;
+    now += kDriverPeriod;
     driver->wake(now);
     const std::array<double, 2> wanted = {0.5, 1.0};
     if (commanding)
@@ -140,7 +140,7 @@ TEST_F(Driver, PressuresThatAreNoNumbersAreNoAnswer) {
 // The clock is asked again after the decision: hardware that has vented meanwhile gets zero.
 TEST_F(Driver, WhatWasDecidedBeforeAGapIsNotWrittenAfterIt) {
   run();
-  now += kPeriod;
+  now += kDriverPeriod;
   driver->wake(now);
   const std::int64_t decided_ns = now;
   now += 300 * kMs;

@@ -15,7 +15,8 @@ constexpr std::int64_t kLookEvery_ns = 10'000'000;  ///< whether to stop
 
 }  // namespace
 
-FaultRelay::FaultRelay(const LcmSettings& lcm, const std::string& suffix, int fifo_priority)
+FaultRelay::FaultRelay(const LcmSettings& lcm, const std::string& suffix, int fifo_priority,
+                       const std::string& valves_channel)
     : lcm_(lcm), node_(lcm.url) {
   node_.subscribe(lcm_.mocap_channel + suffix, kCapacity, [this](const ReceivedMessage& packet) {
     if (!decode(packet.bytes, received_)) return;
@@ -30,6 +31,11 @@ FaultRelay::FaultRelay(const LcmSettings& lcm, const std::string& suffix, int fi
                     if (injector_.pass(measurement_))
                       node_.publish(lcm_.measurement_channel, measurement_);
                   });
+  if (!valves_channel.empty())
+    node_.subscribe(lcm_.command_channel, kCapacity,
+                    [this, valves_channel](const ReceivedMessage& packet) {
+                      if (!loses_commands_) node_.publish_encoded(valves_channel, packet.bytes);
+                    });
   thread_ = std::jthread([this, fifo_priority](const std::stop_token& stop) {
     if (fifo_priority > 0) apply_realtime_settings({.fifo = true, .priority = fifo_priority});
     work(stop);

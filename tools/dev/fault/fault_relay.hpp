@@ -17,15 +17,19 @@ namespace softarm {
 
 inline constexpr const char* kSensorSuffix = "_CLEAN";
 
-/// Works in a separate thread from construction to destruction. A message that cannot be decoded
+/// Works in a separate thread from construction to destruction. Where it has a channel for them, it
+/// passes the daemon's commands on to the valves too, or loses them. A message that cannot be decoded
 /// does not go through.
 class FaultRelay {
  public:
   /// `fifo_priority` > 0: under SCHED_FIFO, for a machine that is loaded. @throws TransportError
-  FaultRelay(const LcmSettings& lcm, const std::string& suffix, int fifo_priority = 0);
+  FaultRelay(const LcmSettings& lcm, const std::string& suffix, int fifo_priority = 0,
+             const std::string& valves_channel = {});
 
   /// From the next message on.
   void set(const Fault& fault);
+
+  void lose_commands(bool lose) { loses_commands_ = lose; }
 
   std::int64_t frames_received() const { return frames_received_; }
 
@@ -38,6 +42,7 @@ class FaultRelay {
   std::mutex mutex_;
   FaultInjector injector_;
   std::atomic<std::int64_t> frames_received_{0};
+  std::atomic<bool> loses_commands_{false};
   softarm_messages::mocap_frame_t received_, sent_;
   softarm_messages::pressure_measurement_t measurement_;
   std::jthread thread_;

@@ -47,6 +47,8 @@ class SoakArm {
   bool plant_vented() const { return client_.plant() && client_.plant()->vented; }
   /// The chamber with the highest commanded pressure, and that pressure.
   int fullest_chamber() const;
+  /// Of the newest command.
+  std::size_t chambers() const { return static_cast<std::size_t>(commanded_bar_.size()); }
   double fullest_bar() const;
 
   /// Every mode and reason since the last `forget`.

@@ -51,10 +51,21 @@ constexpr std::array kFaults{
               &ArmStatus::messages_malformed, 100},
     SoakFault{"daemon stopped", SoakAction::pause_daemon, "", 0.0, Mode::vent, Reason::time_gap},
     SoakFault{"plant stopped", SoakAction::pause_plant, "", 0.0, Mode::vent, Reason::frames_stale},
+    SoakFault{"stop while paused", SoakAction::stop_while_paused, "", 0.0, Mode::fault,
+              Reason::emergency_stop},
+    SoakFault{"stop in a flood", SoakAction::stop_in_flood, "", 0.0, Mode::fault,
+              Reason::emergency_stop},
+    SoakFault{"second commander", SoakAction::second_commander, "", 0.0, Mode::vent,
+              Reason::foreign_commands},
+    SoakFault{"commands lost", SoakAction::lose_commands, "", 0.0, Mode::vent,
+              Reason::command_expired},
+    SoakFault{"suspended", SoakAction::suspend, "", 0.0, Mode::vent, Reason::time_gap},
     SoakFault{"plant replaced", SoakAction::restart_plant, "", 0.0, Mode::vent,
               Reason::frames_stale},
     SoakFault{"daemon ended", SoakAction::end_daemon},
     SoakFault{"daemon killed", SoakAction::kill_daemon},
+    SoakFault{"killed in FAULT", SoakAction::kill_stopped, "", 0.0, Mode::fault,
+              Reason::emergency_stop},
 };
 
 }  // namespace

@@ -20,9 +20,15 @@ enum class SoakAction {
   flood,         ///< the same, as fast as they can be sent
   pause_daemon,  ///< SIGSTOP, for longer than vent_after_s
   pause_plant,
-  restart_plant,  ///< SIGKILL, and another one
-  end_daemon,     ///< SIGTERM, and another one
-  kill_daemon     ///< SIGKILL, and another one
+  stop_while_paused,  ///< an emergency stop that the daemon hears when it goes on
+  stop_in_flood,      ///< one among requests that are none
+  second_commander,   ///< one command of somebody else, for full pressure
+  lose_commands,      ///< between daemon and valves, for longer than they are valid
+  suspend,            ///< the daemon's CLOCK_MONOTONIC stands still
+  restart_plant,      ///< SIGKILL, and another one
+  end_daemon,         ///< SIGTERM, and another one
+  kill_daemon,        ///< SIGKILL, and another one
+  kill_stopped        ///< the same after an emergency stop, which the other one has to know of
 };
 
 /// Demanded is a mode with its reason, or, where nothing may happen to the arm, that a counter of

@@ -18,9 +18,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr double kPatience_s = 15.0;
 constexpr int kSteadyStatuses = 50;  ///< ACTIVE in a row: recovered
-constexpr double kBurstFrom_bar = 0.5;
 
 }  // namespace
 
@@ -37,7 +35,13 @@ std::filesystem::path write_soak_config(const SoakOptions& options) {
       "    valve_readback: true, valve_silence_s: 0.4, deadman_timeout_s: 1.5}}\n"
       "plant: {{mocap: {{rate_hz: 500}}}}\n",
       std::filesystem::absolute(options.config).string(), options.seed, 20000 + getpid() % 12000);
-  write_text(path, text, load_experiment(options.config).files);
+  const auto files = load_experiment(options.config).files;
+  write_text(path, text, files);
+  write_text(options.folder / "soak_plant.yaml",
+             fmt::format("include: soak.yaml\nname: soak_plant\n"
+                         "daemon: {{lcm: {{command_channel: {}}}}}\n",
+                         kSoakValvesChannel),
+             files);
   return path;
 }
 
@@ -47,11 +51,12 @@ SoakRun::SoakRun(const SoakOptions& options)
       experiment_(load_experiment(config_)),
       random_(options.seed),
       arm_(experiment_),
-      relay_(experiment_.transport.lcm, kSensorSuffix),
+      relay_(experiment_.transport.lcm, kSensorSuffix, 0, kSoakValvesChannel),
       sender_(experiment_.transport.lcm.url),
       daemon_{.name = "softarmd", .arguments = {config_.string()}, .process = {}, .record = {}},
       plant_{.name = "softarm-plant",
-             .arguments = {config_.string(), "--sensor-suffix", kSensorSuffix},
+             .arguments = {(options.folder / "soak_plant.yaml").string(), "--sensor-suffix",
+                           kSensorSuffix},
              .process = {},
              .record = {}},
       replace_until_s_(std::min(0.25 * options.duration_s, 300.0)),
@@ -64,15 +69,26 @@ SoakRun::SoakRun(const SoakOptions& options)
     throw ConfigError(options.config, 0, "daemon.mocap.source",
                       "softarm, the only frames that a soak can corrupt", "another source");
   for (const SoakFault& fault : soak_faults()) counters_.faults.push_back({.name = fault.name});
+#ifndef SOFTARM_SANITIZED  // whose runtime must be loaded first
+  if (std::filesystem::exists(SOFTARM_WALL_CLOCK))
+    clocks_.emplace((options.folder / "clocks").string());
+#endif
 }
 
 double SoakRun::passed_s() const { return to_seconds(monotonic_now_ns() - start_ns_); }
 
 void SoakRun::start(Program& program) {
   const int number = program.process ? ++program.record.instances : 1;
+  std::string path = program_beside_this(program.name);
+  std::vector<std::string> arguments = program.arguments;
+  if (&program == &daemon_ && clocks_) {
+    arguments.insert(arguments.begin(), path);
+    const std::vector<std::string> preload = clocks_->preload();
+    arguments.insert(arguments.begin(), preload.begin(), preload.end());
+    path = "env";
+  }
   program.process = std::make_unique<ChildProcess>(
-      program_beside_this(program.name), program.arguments,
-      (options_.folder / fmt::format("{}_{}.txt", program.name, number)).string());
+      path, arguments, (options_.folder / fmt::format("{}_{}.txt", program.name, number)).string());
   program.record.name = program.name;
 }
 
@@ -148,75 +164,8 @@ const SoakFault& SoakRun::next_fault(double now_s) {
     }
     const SoakFault& fault = faults[cycle_.back()];
     cycle_.pop_back();
+    if (fault.action == SoakAction::suspend && !clocks_) continue;
     if (!fault.replaces_process() || now_s < replace_until_s_) return fault;
-  }
-}
-
-void SoakRun::send_hostile_bytes() {
-  const std::vector<Packet> packets = hostile_packets(experiment_.transport.lcm);
-  for (int round = 0; round < 10; ++round) {
-    for (const Packet& packet : packets) sender_.send(packet);
-    arm_.wait_for([] { return false; }, 0.02);  // the real frames come through
-  }
-}
-
-void SoakRun::flood() {
-  const Packet garbage =
-      lcm_packet(experiment_.transport.lcm.mocap_channel, Packet(100, std::byte{7}));
-  for (const double end_s = passed_s() + 0.3; passed_s() < end_s;) {
-    for (int k = 0; k < 100; ++k) sender_.send(garbage);
-    arm_.wait_for([] { return true; }, 0.0);
-  }
-}
-
-void SoakRun::cause(const SoakFault& fault) {
-  const double beyond_vent_s = 2.0 * experiment_.safety.vent_after_s;
-  switch (fault.action) {
-    case SoakAction::relay: {
-      Fault chosen = *find_fault(fault.relay_fault);
-      if (fault.amount > 0.0) chosen.amount = fault.amount;
-      const int segments = experiment_.arm.size();
-      chosen.body = std::uniform_int_distribution(1, segments)(random_);
-      if (chosen.kind == FaultKind::burst) {
-        arm_.wait_for([&] { return arm_.fullest_bar() > kBurstFrom_bar; }, kPatience_s);
-        chosen.body = arm_.fullest_chamber();
-      }
-      return relay_.set(chosen);
-    }
-    case SoakAction::disarm:
-      return arm_.request(OperatorRequest::disarm);
-    case SoakAction::emergency_stop:
-      return arm_.request(OperatorRequest::emergency_stop);
-    case SoakAction::let_go:
-      return arm_.set_dead_man(SoakArm::DeadMan::let_go);
-    case SoakAction::fall_silent:
-      return arm_.set_dead_man(SoakArm::DeadMan::silent);
-    case SoakAction::hostile:
-      return send_hostile_bytes();
-    case SoakAction::flood:
-      return flood();
-    case SoakAction::pause_daemon: {
-      const std::int64_t before = arm_.overruns();
-      const std::int64_t tick = arm_.ticks();
-      daemon_.process->stop();
-      arm_.wait_for([] { return false; }, beyond_vent_s);
-      daemon_.process->signal(SIGCONT);
-      arm_.wait_for([&] { return arm_.ticks() > tick + 2; }, kPatience_s);
-      counters_.overruns_while_stopped += arm_.overruns() - before;
-      return;
-    }
-    case SoakAction::pause_plant:
-      return plant_.process->stop();
-    case SoakAction::restart_plant:
-      plant_.process->signal(SIGKILL);
-      plant_.process->wait(5s);
-      return;
-    case SoakAction::end_daemon:
-      return end(daemon_);
-    case SoakAction::kill_daemon:
-      daemon_.process->signal(SIGKILL);
-      daemon_.process->wait(5s);
-      return;
   }
 }
 

@@ -3,12 +3,15 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <memory>
+#include <optional>
 #include <random>
 #include <string>
 #include <vector>
 
 #include "dev/child_process.hpp"
+#include "dev/clock/preloaded_clocks.hpp"
 #include "dev/fault/fault_relay.hpp"
 #include "dev/fault/raw_packets.hpp"
 #include "dev/soak/soak_arm.hpp"
@@ -25,9 +28,13 @@ struct SoakOptions {
   std::filesystem::path folder;  ///< for the configuration and what the processes print
 };
 
+/// The plant listens to this channel, to which commands are passed on.
+inline constexpr const char* kSoakValvesChannel = "SOFTARM_SOAK_VALVES";
+
 /// Writes the soak's own configuration into the folder and returns its path: the experiment with
 /// tick and motion capture at 500 Hz, live references, explicit arming, read-back, a dead-man
-/// input, thresholds that a busy machine does not reach by itself, and a separate port.
+/// input, thresholds that a busy machine does not reach by itself, and a separate port. The plant's,
+/// soak_plant.yaml, is the same with another channel for commands.
 std::filesystem::path write_soak_config(const SoakOptions& options);
 
 class SoakRun {
@@ -39,6 +46,8 @@ class SoakRun {
   SoakCounters run();
 
  private:
+  static constexpr double kPatience_s = 15.0;
+
   struct Program {
     std::string name;
     std::vector<std::string> arguments;
@@ -57,8 +66,12 @@ class SoakRun {
   bool answered(const SoakFault& fault, std::int64_t counter_before);
   void clear(const SoakFault& fault);
   void make(const SoakFault& fault, FaultCount& count);
+  void pause_daemon(const std::function<void()>& meanwhile);
+  void insist_on_stop();
+  void send_foreign_command();
   void send_hostile_bytes();
-  void flood();
+  void flood(
+      const std::string& channel, const std::function<void()>& meanwhile = [] {});
   double passed_s() const;
 
   SoakOptions options_;
@@ -68,6 +81,7 @@ class SoakRun {
   SoakArm arm_;
   FaultRelay relay_;
   RawSender sender_;
+  std::optional<PreloadedClocks> clocks_;  ///< of the daemon, where their library was built
   Program daemon_, plant_;
   std::vector<std::size_t> cycle_;  ///< faults still to come before all have been there once more
   std::int64_t start_ns_ = 0;

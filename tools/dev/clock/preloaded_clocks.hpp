@@ -1,4 +1,4 @@
-// The clocks of a process started with `preload` (wall_clock.cpp), which a test sets.
+// The clocks of a process started with `preload` (wall_clock.cpp), which a test or a soak sets.
 #pragma once
 
 #include <fcntl.h>
@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-namespace softarm::test {
+namespace softarm {
 
 class PreloadedClocks {
  public:
@@ -48,4 +48,4 @@ class PreloadedClocks {
   std::atomic<std::int64_t>* shared_ = nullptr;
 };
 
-}  // namespace softarm::test
+}  // namespace softarm
