@@ -83,9 +83,9 @@ void ElongationReference::force_beside_spring(double time_s,
                    sample_.acceleration, {}, tau_);
   for (int i = 0; i < arm_.size(); ++i) {
     const SegmentParameters& segment = arm_.segments[static_cast<std::size_t>(i)];
-    const Eigen::Vector2d bend =
-        tau_.segment<2>(3 * i) + segment.stiffness_nm_per_rad * sample.u.segment<2>(3 * i) +
-        segment.damping_nms_per_rad * sample.velocity.segment<2>(3 * i);
+    const Eigen::Vector2d bend = tau_.segment<2>(3 * i) +
+                                 segment.stiffness_nm_per_rad * sample.u.segment<2>(3 * i) +
+                                 segment.damping_nms_per_rad * sample.velocity.segment<2>(3 * i);
     const double beside_n = tau_[3 * i + 2];
     const double wanted_n = beside_n + segment.axial_stiffness_n_per_m * sample.u[3 * i + 2] +
                             segment.axial_damping_ns_per_m * sample.velocity[3 * i + 2];

@@ -60,7 +60,7 @@ class ElongationReference {
   const PressureAllocator& allocator_;
   DynamicsWorkspace workspace_;
   double time_s_ = 0.0;
-  SegmentScalars e_, rate_, acceleration_;  ///< at time_s_
+  SegmentScalars e_, rate_, acceleration_;             ///< at time_s_
   SegmentScalars force_, force_before_, force_after_;  ///< N - I
   ReferenceSample sample_;
   SegmentVector tau_;

@@ -63,8 +63,11 @@ TEST(AxialChamberMap, PressuresWithinLimitsGiveTorqueAndAxialForceBack) {
       EXPECT_EQ(scale, 1.0);
       EXPECT_GE(found.minCoeff(), 0.0);
       EXPECT_LE(found.maxCoeff(), 2.0);
-      EXPECT_LT((segment.matrix() * found - tau).cwiseAbs().cwiseQuotient(
-                    Eigen::Vector3d(kGain, kGain, kArea)).maxCoeff(), 1e-12);
+      EXPECT_LT((segment.matrix() * found - tau)
+                    .cwiseAbs()
+                    .cwiseQuotient(Eigen::Vector3d(kGain, kGain, kArea))
+                    .maxCoeff(),
+                1e-12);
       // Nearest to the bias: no pressures with the same forces are nearer.
       EXPECT_LE((found.array() - 0.3).matrix().norm(), (p.array() - 0.3).matrix().norm() + 1e-12);
     }
@@ -163,9 +166,9 @@ TEST(AxialChamberMap, WithinReachIsSmoothAndInside) {
       const double n = at(x, wanted);
       EXPECT_GE(n, std::max(range.low_n, wanted) - 1e-9);
       EXPECT_LE(n, std::max(range.low_n, wanted) + w * std::log(6.0));
-      largest_bend = std::max(
-          largest_bend, std::abs(at(x + kStep, wanted) - 2.0 * n + at(x - kStep, wanted)) /
-                            (kStep * kStep));
+      largest_bend =
+          std::max(largest_bend, std::abs(at(x + kStep, wanted) - 2.0 * n + at(x - kStep, wanted)) /
+                                     (kStep * kStep));
     }
   }
   // d^2 N / dx^2 of a kink of 2 a spread over w is a^2 / w at most; at the kink itself it would be

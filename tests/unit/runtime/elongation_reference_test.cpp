@@ -69,8 +69,8 @@ TEST(ElongationReference, WithinReachItGoesToWhatIsAskedForAsASpringAndADamperDo
   reference.start(0.0, SegmentVector::Zero(6));
   SegmentVector asked = SegmentVector::Zero(6);
   asked[2] = asked[5] = kWanted_m;
-  const double rate = arm.segments[0].axial_stiffness_n_per_m /
-                      arm.segments[0].axial_damping_ns_per_m;
+  const double rate =
+      arm.segments[0].axial_stiffness_n_per_m / arm.segments[0].axial_damping_ns_per_m;
   for (int k = 1; k <= 200; ++k) {
     ReferenceWindow window = at_rest(asked, kLookahead_s);
     reference.advance(k * kTick_s, kLookahead_s, window);
