@@ -110,10 +110,17 @@ class Station {
   }
 
   void people() {
+    const bool stop = chance(0.0005);
+    const bool disarm = chance(0.002) || (monitor_.mode() == Mode::fault && chance(0.02));
     requests_.arm |= chance(0.02);
-    requests_.disarm |= chance(0.002);
-    requests_.emergency_stop |= chance(0.0005);
-    if (monitor_.mode() == Mode::fault) requests_.disarm |= chance(0.02);
+    requests_.disarm |= disarm;
+    requests_.emergency_stop |= stop;
+    // The valve side hears them too, while no daemon runs as well.
+    if (!wire_ || !driver_runs_) return;
+    if (disarm) guard_.acknowledge();
+    if (stop) guard_.emergency_stop();
+    if (disarm) emergency_ns_ = kNever;
+    if (stop) emergency_ns_ = now_ns_;
   }
 
   void send(const Command& command) {
@@ -237,6 +244,8 @@ class Station {
     if (!driver_runs_ && secured_ && now_ns_ - fed_ns_ >= kFailsafe) held_bar_ = 0.0;
     pressurised_ticks_ += held_bar_ > 0.0;
     if (held_bar_ == 0.0) return;
+    ASSERT_TRUE(emergency_ns_ == kNever || now_ns_ - emergency_ns_ <= kBound)
+        << "an emergency stop that the valve side heard";
     const std::int64_t since_ns = now_ns_ - std::max(controlled_ns_, foreign_ns_);
     ASSERT_LE(since_ns, kBound) << fmt::format("{} bar, {}, {}", held_bar_, name(monitor_.mode()),
                                                name(guard_.state()));
@@ -272,6 +281,7 @@ class Station {
 
   bool may_press_ = arming_ == Arming::automatic;
   std::int64_t controlled_ns_ = 0, foreign_ns_ = 0, whole_ns_ = 0;
+  std::int64_t emergency_ns_ = kNever;  ///< until a disarm
   int activations_ = 0;
   std::int64_t pressurised_ticks_ = 0;
 };
