@@ -71,7 +71,6 @@ void add_choice_options(CLI::App& command, IdentifyCommand& options) {
   command.add_flag("--chamber-lags", options.choice.chamber_lags, "the same of every chamber");
   command.add_flag("--saturation", options.choice.saturation,
                    "fit how every chamber's push bends off with pressure");
-  command.add_flag("--hysteresis", options.choice.hysteresis, "fit springs that slip");
   command.add_flag("--remanence", options.choice.remanence, "fit a rest that follows the bend");
   command.add_flag("--stiffening", options.choice.stiffening, "fit a stiffness that pressures add");
   command.add_flag("--cross", options.choice.cross, "fit forces of chambers on other segments");
