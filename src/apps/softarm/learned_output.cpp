@@ -13,7 +13,7 @@ namespace softarm {
 
 void add_learned_option(CLI::App& command, std::string& file) {
   command.add_option("--learned", file,
-                     "experiment to write: CONFIG with the stiffness, damping, gains and tilt that "
+                     "experiment to write: CONFIG with the stiffness, damping and gains that "
                      "the model-based observer found");
 }
 

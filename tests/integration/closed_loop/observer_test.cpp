@@ -108,24 +108,6 @@ TEST(LearnedArm, WithItPaper17TracksAWrongArmNearlyAsItsOwn) {
   EXPECT_LT(error_rad(wrong, learned), 1.5 * nominal_rad);
 }
 
-TEST(LearnedArm, ATiltIsADirectionOfGravity) {
-  const Experiment experiment = observed("tilt 10 degrees");
-  Loop loop(experiment);
-  loop.run_until(20.0);
-  ASSERT_TRUE(is_tilt(loop.report));
-  const Eigen::Vector3d gravity = corrected(experiment, loop.report).arm.gravity_mps2;
-  EXPECT_NEAR(gravity.norm(), experiment.arm.gravity_mps2.norm(), 1e-9);
-  // The plant's base is turned by 10 degrees about the world's y axis, gravity seen from the base by
-  // as much the other way.
-  const Eigen::Vector3d seen = experiment.arm.base_rotation *
-                               experiment.plant.arm.base_rotation.transpose() *
-                               experiment.plant.arm.gravity_mps2;
-  EXPECT_LT(std::acos(gravity.normalized().dot(seen.normalized())), 0.02);
-  ObserverReport level;
-  level.segments = 3;
-  EXPECT_FALSE(is_tilt(level));
-}
-
 /// Pushed from 10 s on.
 Experiment pushed(const std::string& scene, const Eigen::Vector3d& force_n, double duration_s,
                   double start_s = 10.0) {

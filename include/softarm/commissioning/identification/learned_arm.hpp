@@ -9,16 +9,10 @@
 
 namespace softarm {
 
-/// The experiment's arm and chambers with the observer's corrections of stiffness, damping and gain,
-/// and of gravity's direction, if all segments have the same horizontal load: that is a base tilted by
-/// atan |load|. All corrections are relative to the vertical component of the weight, so under a
-/// tilt by a they are multiplied by cos a. A load that differs from segment to segment (a payload, a
-/// force on the tip) has no place in a configuration and is left out.
+/// The experiment's arm and chambers with the observer's corrections of stiffness, damping and gain.
+/// A horizontal load (a tilt, a payload, a force on the tip) has no place in a configuration and is
+/// left out.
 Experiment corrected(const Experiment& experiment, const ObserverReport& learned);
-
-/// Whether the loads are those of a tilted base: their mean is more than three standard deviations,
-/// and each differs from it by at most three deviations plus a fifth of the mean.
-bool is_tilt(const ObserverReport& learned);
 
 /// An experiment that includes `config`, with what was learnt in place of the configured values; the
 /// simulated arm stays as it was. To be written to `output`.
