@@ -128,17 +128,19 @@ TEST(PlantKeys, SegmentsThatStretch) {
   refuses(
       "plant: {actuation: {chambers: {angle_rad: [0, 2, 4], gain_nm_per_bar: 1, offset_m: 0}}}\n",
       7, "offset_m");
-  // The controller has no third coordinate: not for run, not for the daemon.
+  // The controller has no third coordinate in polar coordinates; in u it has.
   std::string controlled = kChambers;
   controlled.insert(controlled.find("{segments: 3") + 1, "extensible: true, ");
+  const Experiment both = load_experiment(folder.write("c.yaml", controlled));
+  EXPECT_TRUE(both.arm.extensible && both.plant.arm.extensible);
+  controlled.insert(controlled.find("control: {") + 10, "coordinates: polar, ");
   try {
     load_experiment(folder.write("c.yaml", controlled));
     ADD_FAILURE() << "accepted";
   } catch (const ConfigError& error) {
     EXPECT_EQ(error.line, 2);
     EXPECT_EQ(error.key, "arm.extensible");
-    EXPECT_NE(error.expected.find("the controller has no segments that stretch"),
-              std::string::npos);
+    EXPECT_NE(error.expected.find("control.coordinates: polar"), std::string::npos);
   }
 }
 
