@@ -18,7 +18,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kPeriod_s = 0.002;
+constexpr double kStep_s = 0.002;
 
 /// An arm that is where its reference is.
 class Follower {
@@ -37,16 +37,16 @@ class Follower {
   }
   void step() {
     const Vector3d before = tip();
-    time_s_ += kPeriod_s;
-    reference_.measure_tip(time_s_ - kPeriod_s, before);
+    time_s_ += kStep_s;
+    reference_.measure_tip(time_s_ - kStep_s, before);
     reference_.advance(time_s_);
     reference_.sample(time_s_, now_);
-    fastest_mps_ = std::max(fastest_mps_, (tip() - before).norm() / kPeriod_s);
+    fastest_mps_ = std::max(fastest_mps_, (tip() - before).norm() / kStep_s);
     for (int i = 0; i < arm_.size(); ++i)
       most_theta_rad_ = std::max(most_theta_rad_, now_.u.segment<2>(2 * i).norm());
   }
   void run(double seconds) {
-    for (int k = 0; k < seconds / kPeriod_s; ++k) step();
+    for (int k = 0; k < seconds / kStep_s; ++k) step();
   }
   Vector3d tip() const { return tip_position(arm_, now_.u); }
 

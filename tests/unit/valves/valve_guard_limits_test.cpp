@@ -158,7 +158,9 @@ TEST_F(GuardLimits, WithoutAnEchoAPressureThatFallsByMoreThanABoundIsAGap) {
       read_back.actual_bar[chamber] -= beyond ? 0.25 + 1e-9 : 0.25;
       measure();
       EXPECT_EQ(guard->state(), beyond ? ValveState::degraded : ValveState::running) << chamber;
-      if (beyond) EXPECT_EQ(guard->reason(), ValveReason::time_gap);
+      if (beyond) {
+        EXPECT_EQ(guard->reason(), ValveReason::time_gap);
+      }
     }
   }
   // One that has never been higher has not fallen.
