@@ -9,13 +9,13 @@
 namespace softarm {
 namespace {
 
-Experiment configured(const std::string& name) {
+Experiment shipped_experiment(const std::string& name) {
   return load_experiment(std::filesystem::path(SOFTARM_SOURCE_DIR) / "config" / name);
 }
 
 void holds(const RobustnessScene& scene, int seeds) {
   const Experiment experiment =
-      robustness_experiment(scene, RobustnessLaw::observer_parameters, configured);
+      robustness_experiment(scene, RobustnessLaw::observer_parameters, shipped_experiment);
   for (int seed = 1; seed <= seeds; ++seed) {
     const RobustnessTrial trial = run(experiment, scene, static_cast<std::uint64_t>(seed));
     EXPECT_TRUE(trial.stayed_active) << scene.name << ", seed " << seed;
@@ -26,7 +26,7 @@ void holds(const RobustnessScene& scene, int seeds) {
 TEST(Robustness, AFewArmsThatAreNotTheirModel) {
   int found = 0;
   for (const RobustnessScene& scene : robustness_scenes())
-    for (const char* const name : {"as configured", "mismatch 20 %", "tilt 20 degrees",
+    for (const char* const name : {"as shipped_experiment", "mismatch 20 %", "tilt 20 degrees",
                                    "links plant", "200 ms without frames each second"})
       if (scene.name == name) {
         ++found;
