@@ -30,6 +30,7 @@ class ReachEnv(gymnasium.Env):
             raise ValueError("step_s, episode_s: expected 0 < step_s <= episode_s")
         self._arm = softarm.Arm(experiment)
         self._allocator = softarm.Allocator(experiment)
+        self._experiment = experiment
         self._plant = softarm.Plant(experiment)
         self._start_u = self._plant.u
         self._lowest, self._highest = experiment.pressure_limits_bar
@@ -64,6 +65,7 @@ class ReachEnv(gymnasium.Env):
         """Back to rest without pressure, with another target. options: {"target_m": (3,)} to choose it."""
         super().reset(seed=seed)
         zero = np.zeros(self._plant.chambers)
+        self._plant = softarm.Plant(self._experiment)  # an integrator that goes on would not repeat its bits
         self._plant.reset(self._start_u, np.zeros(self._arm.dof), np.clip(zero, self._lowest, self._highest))
         self._steps = 0
         chosen = (options or {}).get("target_m")

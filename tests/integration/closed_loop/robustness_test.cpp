@@ -26,7 +26,7 @@ void holds(const RobustnessScene& scene, int seeds) {
 TEST(Robustness, AFewArmsThatAreNotTheirModel) {
   int found = 0;
   for (const RobustnessScene& scene : robustness_scenes())
-    for (const char* const name : {"as shipped_experiment", "mismatch 20 %", "tilt 20 degrees",
+    for (const char* const name : {"as configured", "mismatch 20 %", "tilt 20 degrees",
                                    "links plant", "200 ms without frames each second"})
       if (scene.name == name) {
         ++found;

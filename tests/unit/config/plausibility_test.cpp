@@ -152,8 +152,9 @@ TEST(Warned, OfTipPathsOutOfReach) {
   const auto partly = path(
       "tip_circle, centre_m: [0, 0, 0], first_axis_m: [0.31, 0, 0], second_axis_m: "
       "[0, 0.02, 0], rate_radps: 1");
-  ASSERT_EQ(partly.size(), 1u);
+  ASSERT_EQ(partly.size(), 2u);
   EXPECT_NE(partly[0].find("% of the path are out of reach"), std::string::npos) << partly[0];
+  EXPECT_NE(partly[1].find("chambers cannot hold"), std::string::npos) << partly[1];
 }
 
 TEST(Arming, IsExplicitByDefaultWhereValvesMayBeReal) {

@@ -446,6 +446,7 @@ TEST(CauseTableInCode, IsAsDocumented) {
       CauseRule{Reason::valves_silent, Mode::fault, Clearance::disarm_then_arm},
       CauseRule{Reason::pressure_mismatch, Mode::fault, Clearance::disarm_then_arm},
       CauseRule{Reason::curvature_mismatch, Mode::fault, Clearance::disarm_then_arm},
+      CauseRule{Reason::wrong_model, Mode::fault, Clearance::disarm_then_arm},
       CauseRule{Reason::length_mismatch, Mode::fault, Clearance::disarm_then_arm},
       CauseRule{Reason::disarmed, Mode::vent, Clearance::arm},
       CauseRule{Reason::deadman_released, Mode::vent, Clearance::arm},
@@ -454,6 +455,7 @@ TEST(CauseTableInCode, IsAsDocumented) {
       CauseRule{Reason::soft_limit, Mode::vent, Clearance::arm},
       CauseRule{Reason::activated_too_often, Mode::vent, Clearance::arm},
       CauseRule{Reason::oscillation, Mode::vent, Clearance::arm},
+      CauseRule{Reason::contact_vented, Mode::vent, Clearance::arm},
       CauseRule{Reason::valves_silent, Mode::vent, Clearance::good_frames},
       CauseRule{Reason::pressure_mismatch, Mode::vent, Clearance::good_frames},
       CauseRule{Reason::length_mismatch, Mode::vent, Clearance::good_frames},
@@ -461,10 +463,13 @@ TEST(CauseTableInCode, IsAsDocumented) {
       CauseRule{Reason::command_expired, Mode::vent, Clearance::good_frames},
       CauseRule{Reason::sender_restarted, Mode::vent, Clearance::good_frames},
       CauseRule{Reason::frames_stale, Mode::vent, Clearance::good_frames},
+      CauseRule{Reason::law_silent, Mode::vent, Clearance::good_frames},
       CauseRule{Reason::frame_period_mismatch, Mode::vent, Clearance::good_frames},
       CauseRule{Reason::many_overruns, Mode::vent, Clearance::good_frames},
       CauseRule{Reason::frames_late, Mode::hold, Clearance::good_frames},
+      CauseRule{Reason::law_late, Mode::hold, Clearance::good_frames},
       CauseRule{Reason::poses_frozen, Mode::hold, Clearance::good_frames},
+      CauseRule{Reason::contact, Mode::hold, Clearance::good_frames},
       CauseRule{Reason::overruns, Mode::hold, Clearance::good_frames}};
   const auto rules = cause_table();
   ASSERT_EQ(rules.size(), kDocumented.size());
