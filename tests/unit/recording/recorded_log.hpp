@@ -80,7 +80,7 @@ inline RecordedRun record_run(const Experiment& experiment, double seconds, bool
   };
   const std::int64_t period_ns = pipeline.period_ns();
   const auto ticks = to_ns(seconds) / period_ns;
-  const SegmentVector zero = SegmentVector::Zero(experiment.arm.dof());
+  const SegmentVector zero = SegmentVector::Zero(2 * experiment.arm.size());
   const LiveReferenceInput reference{zero, zero, zero};
   const TipTargetInput target{{0.02, 0.01, -0.31}, {0.01, 0.0, 0.0}};
   LawInput law, next;

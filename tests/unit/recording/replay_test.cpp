@@ -83,7 +83,10 @@ TEST(Replay, AnArmThatStretchesIsReproducedBitForBit) {
   const test::RecordedRun run = test::record_run(experiment, 3.0, false, log);
   EXPECT_GT(std::count(run.modes.begin(), run.modes.end(), Mode::active), 100);
   const ReplaySummary summary = replay(log.bytes, experiment).summary;
-  EXPECT_TRUE(summary.complete());
+  EXPECT_TRUE(summary.complete()) << summary.ticks << " ticks, " << summary.gap_count << " gaps, "
+                                  << summary.malformed << " malformed";
+  for (const FieldDifference& each : summary.first.fields)
+    ADD_FAILURE() << each.field << ": " << each.recorded << ", " << each.replayed;
 }
 
 TEST(Replay, AnExternalLawAndTargetsOfTheTipAreReproducedToo) {
