@@ -60,7 +60,7 @@ endfunction()
 
 # Only what is tested is optimised in full, and several files are compiled as one: a third of the tests' compile time.
 function(softarm_optimise_test target)
-  set_target_properties(${target} PROPERTIES UNITY_BUILD ${SOFTARM_PRECOMPILED_HEADERS} UNITY_BUILD_BATCH_SIZE 6)
+  set_target_properties(${target} PROPERTIES UNITY_BUILD ${SOFTARM_PRECOMPILED_HEADERS} UNITY_BUILD_BATCH_SIZE 8)
   if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
     # At -O1 g++ 12 reports false positives in Eigen and std::string; in tests the sanitizers look for them.
     target_compile_options(${target} PRIVATE $<$<NOT:$<CONFIG:Debug>>:-O1 -Wno-maybe-uninitialized -Wno-array-bounds -Wno-stringop-overflow>)

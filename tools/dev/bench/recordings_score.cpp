@@ -6,7 +6,7 @@
 namespace softarm {
 namespace {
 
-constexpr double kCycle_s = 10.0;  ///< of the published twin's trials
+constexpr double kTrialCycle_s = 10.0;  ///< of the published twin's trials
 constexpr Eigen::Index kPhases = 200;
 
 double rms(double squares, Eigen::Index count) {
@@ -19,7 +19,7 @@ Eigen::MatrixX3d mean_cycle(const Eigen::VectorXd& time_s, const Eigen::MatrixX3
   Eigen::MatrixX3d sum = Eigen::MatrixX3d::Zero(kPhases, 3);
   Eigen::VectorXd count = Eigen::VectorXd::Zero(kPhases);
   for (Eigen::Index k = 0; k < time_s.size(); ++k) {
-    const double phase = std::fmod(time_s[k], kCycle_s) / kCycle_s;
+    const double phase = std::fmod(time_s[k], kTrialCycle_s) / kTrialCycle_s;
     const auto bin = std::clamp<Eigen::Index>(
         static_cast<Eigen::Index>(phase * static_cast<double>(kPhases)), 0, kPhases - 1);
     sum.row(bin) += tip_m.row(k);
@@ -38,7 +38,7 @@ Eigen::MatrixX3d mean_cycle(const Eigen::VectorXd& time_s, const Eigen::MatrixX3
 
 void score_cycles(const Eigen::VectorXd& time_s, const Eigen::MatrixX3d& measured_m,
                   const Eigen::MatrixX3d& predicted_m, ArenaScore& out) {
-  if (time_s[time_s.size() - 1] - time_s[0] < 2.0 * kCycle_s) return;
+  if (time_s[time_s.size() - 1] - time_s[0] < 2.0 * kTrialCycle_s) return;
   const Eigen::MatrixX3d measured = mean_cycle(time_s, measured_m);
   const Eigen::MatrixX3d predicted = mean_cycle(time_s, predicted_m);
   const double along = predicted.leftCols<2>().cwiseProduct(measured.leftCols<2>()).sum();

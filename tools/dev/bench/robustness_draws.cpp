@@ -7,18 +7,11 @@
 #include <nlohmann/json.hpp>
 #include <random>
 
+#include "dev/bench/interleaved.hpp"
 #include "softarm/commissioning/loop_check.hpp"
 
 namespace softarm {
 namespace {
-
-double quantile(std::vector<double> values, double fraction) {
-  if (values.empty()) return 0.0;
-  const auto at = values.begin() +
-                  static_cast<std::ptrdiff_t>(fraction * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), at, values.end());
-  return *at;
-}
 
 struct Counts {
   int stable = 0, good = 0, unstable_foreseen = 0, unstable = 0;
