@@ -11,7 +11,7 @@ namespace {
 constexpr double kLargest_rad = 20.0;  ///< a response beyond it is not that of an arm
 constexpr double kBalanced_rad = 1e-10;
 constexpr double kSlow = 0.2;  ///< a round that shortens the step less needs the slope of its place
-constexpr int kMostRounds = 30;
+constexpr int kMostNewtonRounds = 30;
 
 // Alexander's method of order 3: gamma is the root of x^3 - 3 x^2 + 3 x / 2 - 1/6 in (1/6, 1/2).
 constexpr double kGamma = 0.435866521508459;
@@ -96,7 +96,7 @@ void QuasiStaticMotion::slope(const Eigen::VectorXd& u) {
 bool QuasiStaticMotion::solve(double damped_s, const Eigen::VectorXd& base, Eigen::VectorXd& u) {
   double before = std::numeric_limits<double>::infinity();
   bool fresh = false;
-  for (int round = 0; round < kMostRounds; ++round) {
+  for (int round = 0; round < kMostNewtonRounds; ++round) {
     balance(u, left_);
     if (damped_s > 0.0) left_ += damping_.cwiseProduct(u - base) / damped_s;
     if (damped_s != factored_for_s_ || fresh) {
