@@ -2,14 +2,13 @@
 """Plots an identification: reads DIR/identification.csv of `softarm identify --out DIR`, writes DIR/identification.png with
 measured and simulated u of every segment, the residual, and its correlation in time."""
 import csv
-import pathlib
 import sys
 
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.lines import Line2D
 from plotting import style
-from plotting.command_line import Parser
+from plotting.command_line import plot_folder
 
 
 def read(path):
@@ -59,16 +58,4 @@ def draw(directory):
     return f"{path}: residual {rms:.3g} mrad rms a component"
 
 
-def main():
-    parser = Parser(description=__doc__)
-    parser.add_argument("directory", metavar="DIR", type=pathlib.Path, help="folder of identification.csv")
-    arguments = parser.parse_args()
-    try:
-        print(draw(arguments.directory))
-    except (OSError, ValueError) as error:
-        print(f"{parser.prog}: {error}", file=sys.stderr)
-        return 1
-    return 0
-
-
-sys.exit(main())
+sys.exit(plot_folder(draw, __doc__, "folder of identification.csv"))

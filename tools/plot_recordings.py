@@ -2,14 +2,13 @@
 """Plots recordings of real arms beside what was predicted: reads DIR/*.csv of `softarm-dev bench recordings DATA --out DIR`,
 writes DIR/recordings.png with u of every segment and the tip across and along the axis."""
 import csv
-import pathlib
 import sys
 
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.lines import Line2D
 from plotting import style
-from plotting.command_line import Parser
+from plotting.command_line import plot_folder
 
 
 def read(path):
@@ -66,16 +65,4 @@ def draw(directory):
     return str(path)
 
 
-def main():
-    parser = Parser(description=__doc__)
-    parser.add_argument("directory", metavar="DIR", type=pathlib.Path, help="folder of the files")
-    arguments = parser.parse_args()
-    try:
-        print(draw(arguments.directory))
-    except (OSError, ValueError) as error:
-        print(f"{parser.prog}: {error}", file=sys.stderr)
-        return 1
-    return 0
-
-
-sys.exit(main())
+sys.exit(plot_folder(draw, __doc__, "folder of the files"))

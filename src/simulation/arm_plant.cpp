@@ -206,7 +206,7 @@ void ArmPlant::advance(double t_end_s) {
     if (self.system->remembers()) to_s = std::min(to_s, from_s + kMemoryStep_s);
     self.integrator->advance(to_s);
     self.valves.advance(to_s - from_s);
-    self.hysteresis.remember(self.valves.pressures_bar());
+    if (self.hysteresis.active()) self.hysteresis.remember(self.valves.pressures_bar());
     if (self.system->remembers()) self.system->remember(to_s - from_s, self.integrator->x());
     self.meet_events();
     self.drive();

@@ -5,6 +5,7 @@
 
 #include "softarm/model/actuation_matrix.hpp"
 #include "softarm/model/kinematics.hpp"
+#include "softarm/model/memory.hpp"
 #include "softarm/model/segment.hpp"
 #include "softarm/model/statics.hpp"
 
@@ -92,10 +93,12 @@ void PccSystem::add_cubic(ConstVector u, Vector out) const {
 }
 
 void PccSystem::remember(double passed_s, ConstVector u) {
-  const double moved = -std::expm1(-passed_s / material_.remanence_s);
+  const Remanence element{.share = 1.0, .time_s = material_.remanence_s};
   for (int i = 0; i < segments_; ++i)
-    relaxed_rad_.segment<2>(2 * i) +=
-        moved * (u.segment<2>(width_ * i) - relaxed_rad_.segment<2>(2 * i));
+    for (int axis = 0; axis < 2; ++axis) {
+      double& z = relaxed_rad_[2 * i + axis];
+      z = element.step(z, u[width_ * i + axis], passed_s);
+    }
 }
 
 double PccSystem::unit(Eigen::Index i) const {

@@ -21,8 +21,8 @@ int checked_count(int chambers) {
 }  // namespace
 
 Valves::Valves(const ValveSettings& settings, int chambers, bool both_signs)
-    : lag_s_(settings.lag_s),
-      vent_lag_s_(settings.vent_lag_s == 0.0 ? settings.lag_s : settings.vent_lag_s),
+    : lag_{.fill_s = settings.lag_s,
+           .vent_s = settings.vent_lag_s == 0.0 ? settings.lag_s : settings.vent_lag_s},
       supply_bar_(settings.supply_pressure_bar),
       lowest_bar_(both_signs ? -settings.supply_pressure_bar : 0.0),
       slew_bar_per_s_(settings.slew_bar_per_s),
@@ -37,8 +37,8 @@ Valves::Valves(const ValveSettings& settings, int chambers, bool both_signs)
                                   " >= 0, got " + std::to_string(value));
     }
   };
-  expect(lag_s_, "lag_s", "time");
-  expect(vent_lag_s_, "vent_lag_s", "time");
+  expect(lag_.fill_s, "lag_s", "time");
+  expect(lag_.vent_s, "vent_lag_s", "time");
   expect(supply_bar_, "supply_pressure_bar", "pressure");
   expect(settings.dead_time_s, "dead_time_s", "time");
   expect(slew_bar_per_s_, "slew_bar_per_s", "rate");
@@ -58,14 +58,14 @@ void Valves::command(std::span<const double> command_bar) noexcept {
     wanted = play(aim, std::clamp(wanted, lowest_bar_, supply_bar_), play_bar_);
     if (std::abs(wanted - aim) >= dead_band_bar_) aim = wanted;
   }
-  if (lag_s_ == 0.0 && exponential()) pressure_bar_ = command_bar_;
+  if (lag_.fill_s == 0.0 && exponential()) pressure_bar_ = command_bar_;
 }
 
 void Valves::after(double ahead_s, Eigen::Ref<Eigen::VectorXd> out) const noexcept {
   for (Eigen::Index i = 0; i < pressure_bar_.size(); ++i) {
     double gap = command_bar_[i] - pressure_bar_[i];
     double left_s = ahead_s;
-    const double lag_s = gap < 0.0 ? vent_lag_s_ : lag_s_;
+    const double lag_s = lag_.time_s(command_bar_[i], pressure_bar_[i]);
     if (slew_bar_per_s_ > 0.0) {
       const double steep = std::abs(gap) - slew_bar_per_s_ * lag_s;  // to go on a straight line
       if (steep > 0.0) {
@@ -85,11 +85,11 @@ void Valves::advance(double step_s) noexcept {
     after(step_s, pressure_bar_);
     return;
   }
-  if (lag_s_ == 0.0) {
+  if (lag_.fill_s == 0.0) {
     return;
   }
   // expm1 keeps the update exact for steps far below the lag.
-  pressure_bar_ += -std::expm1(-step_s / lag_s_) * (command_bar_ - pressure_bar_);
+  pressure_bar_ += -std::expm1(-step_s / lag_.fill_s) * (command_bar_ - pressure_bar_);
 }
 
 void Valves::reset(std::span<const double> pressure_bar) noexcept {

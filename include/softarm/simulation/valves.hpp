@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <span>
 
+#include "softarm/actuation/fill_vent_lag.hpp"
 #include "softarm/simulation/settings.hpp"
 
 namespace softarm {
@@ -45,14 +46,14 @@ class Valves {
 
   /// Whether all pressures are the same exponential of time, as they are without a slew limit and
   /// with one lag.
-  bool exponential() const noexcept { return slew_bar_per_s_ == 0.0 && vent_lag_s_ == lag_s_; }
+  bool exponential() const noexcept { return slew_bar_per_s_ == 0.0 && lag_.vent_s == lag_.fill_s; }
 
   const Eigen::VectorXd& pressures_bar() const noexcept { return pressure_bar_; }  ///< real, now
   /// What the valves aim at, within the supply.
   const Eigen::VectorXd& commanded_bar() const noexcept { return command_bar_; }
 
  private:
-  double lag_s_, vent_lag_s_;
+  FillVentLag lag_;
   double supply_bar_;
   double lowest_bar_;
   double slew_bar_per_s_;
