@@ -23,6 +23,8 @@ struct Vec3 {
     return *this;
   }
 };
+template <class T>
+Vec3(T, T, T) -> Vec3<T>;  // clang 14 deduces none for aggregates
 
 using Vector3 = Vec3<double>;
 using PairVector3 = Vec3<Pair>;
