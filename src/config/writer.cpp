@@ -32,7 +32,7 @@ std::string numbers_text(const Form& form, Row numbers) {
   return fmt::format("[{}]", fmt::join(texts, ", "));
 }
 
-std::string in_quotes(const std::string& text) {
+std::string as_yaml_text(const std::string& text) {
   std::string out = "\"";
   for (const char c : text) {
     if (c == '"' || c == '\\') out += '\\';
@@ -64,7 +64,7 @@ class Writer {
   }
 
   void write_value(const Entry& entry, int depth) {
-    if (entry.kind == Entry::Kind::text) return line(entry.key, in_quotes(entry.text), depth);
+    if (entry.kind == Entry::Kind::text) return line(entry.key, as_yaml_text(entry.text), depth);
     if (entry.kind == Entry::Kind::numbers) {
       const Form::Word* word = entry.form.find(entry.numbers);
       const std::string numbers =

@@ -80,4 +80,7 @@ class ByteCursor {
   bool ok_ = true;
 };
 
+using BigEndianCursor = ByteCursor<std::endian::big>;  // LCM
+using LittleEndianCursor = ByteCursor<std::endian::little>;
+
 }  // namespace softarm

@@ -7,11 +7,7 @@
 #include "softarm/transport/settings.hpp"
 
 namespace softarm {
-namespace {
-
-constexpr std::int64_t kNonsense_us = kLatest_us + 1;  // no clock relation takes it
-
-}  // namespace
+namespace {}  // namespace
 
 std::vector<std::string> mocap_channels(const TransportSettings& transport) {
   if (transport.mocap.source.network) return {};
@@ -81,15 +77,14 @@ std::optional<MocapStanding> MocapSource::standing() const noexcept {
 MocapReceipt MocapSource::take_sent(std::int64_t arrival_ns, MocapFrame& frame) noexcept {
   adapter_.to_frame(*sent_, frame);
   const std::int64_t stamp_us =
-      is_time_us(sent_->sender_time_us) ? sent_->sender_time_us : kNonsense_us;
+      is_time_us(sent_->sender_time_us) ? sent_->sender_time_us : kNoTime_us;
   if (sent_->frame_number != frame_number_) {
     sender_clock_.count(stamp_us == sender_time_us_);
     frame_number_ = sent_->frame_number;
   }
   sender_time_us_ = stamp_us;
   // Several frames with one stamp would be captured at once: the arrival is the better time.
-  frame.capture_ns =
-      clock_.capture_ns(arrival_ns, sender_clock_.coarse() ? kNonsense_us : stamp_us);
+  frame.capture_ns = clock_.capture_ns(arrival_ns, sender_clock_.coarse() ? kNoTime_us : stamp_us);
   return MocapReceipt::frame;
 }
 
@@ -103,7 +98,7 @@ MocapReceipt MocapSource::take_body(std::size_t channel, std::int64_t arrival_ns
       assembler_.add(body, adapter_.to_pose(sent_->body[0], body), stamp_us, arrival_ns);
   if (outcome == FrameAssembler::Outcome::begun)
     assembler_.set_capture_ns(
-        clock_.capture_ns(arrival_ns, assembler_.coarse_clock() ? kNonsense_us : stamp_us));
+        clock_.capture_ns(arrival_ns, assembler_.coarse_clock() ? kNoTime_us : stamp_us));
   adapter_.clear(frame);
   if (!assembler_.take_done(frame)) return MocapReceipt::nothing;
   sender_time_us_ = stamp_us;

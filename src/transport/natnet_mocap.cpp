@@ -18,11 +18,8 @@
 namespace softarm {
 namespace {
 
-constexpr std::size_t kLargestPacket = 65'535;
-constexpr int kMostPackets = 64;  ///< of one step
+constexpr std::size_t kLargestDatagram = 65'535;
 constexpr std::int64_t kAskAgain_ns = 500'000'000;
-/// A server that has been silent for so long may come back as another version.
-constexpr std::int64_t kSilent_ns = 2'000'000'000;
 /// A client of the simulated server that has not asked for so long is gone.
 constexpr std::int64_t kGone_ns = 5'000'000'000;
 
@@ -42,7 +39,7 @@ class NatnetConnection final : public MocapConnection {
         server_(socket_address(network_.host, network_.port)),
         names_(transport.bodies),
         commands_(udp_socket(socket_address(network_.local_address, 0))),
-        buffer_(kLargestPacket),
+        buffer_(kLargestDatagram),
         connect_(natnet_request(NatnetMessage::connect)),
         keep_alive_(natnet_request(NatnetMessage::keep_alive)),
         ask_models_(natnet_request(NatnetMessage::request_models)) {
@@ -145,7 +142,7 @@ class NatnetServer final : public MocapServer {
         names_(transport.bodies),
         dialect_{.version = version_of(network_.version)},
         socket_(udp_socket(socket_address(network_.host, network_.port))),
-        buffer_(kLargestPacket) {
+        buffer_(kLargestDatagram) {
     if (network_.multicast.empty()) return;
     multicast_ = socket_address(network_.multicast, network_.data_port);
     const in_addr interface = socket_address(network_.host, 0).sin_addr;
@@ -176,7 +173,7 @@ class NatnetServer final : public MocapServer {
   };
 
   void answer(std::span<const std::byte> request, const sockaddr_in& from, std::int64_t now_ns) {
-    ByteCursor<std::endian::little> cursor(request);
+    LittleEndianCursor cursor(request);
     const auto kind = static_cast<NatnetMessage>(cursor.take<std::uint16_t>());
     if (!cursor.ok()) return;
     out_.clear();

@@ -10,8 +10,6 @@
 namespace softarm {
 namespace {
 
-using Cursor = ByteCursor<std::endian::little>;
-
 constexpr NatnetVersion kOldest{3, 0}, kMarkerNames{4, 0}, kSizes{4, 1}, kRotations{4, 2};
 constexpr std::size_t kApplicationName = 256;
 constexpr std::size_t kPoint = 3 * 4, kQuaternion = 4 * 4;
@@ -21,7 +19,6 @@ constexpr std::size_t kLeastSet = 1 + 4, kLeastSkeleton = 4 + 4, kLeastDevice = 
 constexpr std::size_t kLongestTail = 64;  ///< what a later version may add to the end of a frame
 constexpr std::uint64_t kMostTicks_per_s = 1'000'000'000'000;
 constexpr std::uint16_t kTracked = 1, kModelsChanged = 2, kVersionChanged = 4;
-constexpr std::int64_t kNoTime_us = kLatest_us + 1;  // no clock relation takes it
 
 enum class Model : std::int32_t {
   marker_set = 0,
@@ -34,7 +31,7 @@ enum class Model : std::int32_t {
 
 /// Skips a section; `skip_element` walks over one element of those versions that give no size.
 template <class SkipElement>
-void skip_section(Cursor& cursor, const NatnetVersion& version, std::size_t element,
+void skip_section(LittleEndianCursor& cursor, const NatnetVersion& version, std::size_t element,
                   const SkipElement& skip_element) {
   if (version >= kSizes) {
     cursor.skip(4);
@@ -45,7 +42,7 @@ void skip_section(Cursor& cursor, const NatnetVersion& version, std::size_t elem
   for (std::size_t k = 0; k < elements && cursor.ok(); ++k) skip_element();
 }
 
-SentBody take_body(Cursor& cursor) {
+SentBody take_body(LittleEndianCursor& cursor) {
   SentBody body;
   body.id = cursor.take<std::int32_t>();
   for (double& each : body.position) each = static_cast<double>(cursor.take<float>());
@@ -56,7 +53,7 @@ SentBody take_body(Cursor& cursor) {
 }
 
 /// The section of rigid bodies. Where its bytes are stated a body may be longer than we know it.
-void take_bodies(Cursor& cursor, const NatnetVersion& version, SentFrame& frame) {
+void take_bodies(LittleEndianCursor& cursor, const NatnetVersion& version, SentFrame& frame) {
   frame.bodies = cursor.count(kRigidBody);
   std::size_t each = kRigidBody;
   if (version >= kSizes) {
@@ -66,35 +63,31 @@ void take_bodies(Cursor& cursor, const NatnetVersion& version, SentFrame& frame)
   }
   if (frame.bodies > SentFrame::kMostBodies) cursor.fail();
   for (std::size_t k = 0; k < frame.bodies && cursor.ok(); ++k) {
-    Cursor body(cursor.take_bytes(each));
+    LittleEndianCursor body(cursor.take_bytes(each));
     frame.body[k] = take_body(body);
   }
 }
 
 /// Force platforms and other devices: channels of samples.
-void skip_device(Cursor& cursor) {
+void skip_device(LittleEndianCursor& cursor) {
   cursor.skip(4);
   const std::size_t channels = cursor.count(4);
   for (std::size_t k = 0; k < channels && cursor.ok(); ++k) cursor.skip_list(4);
 }
 
-std::int64_t to_us(double time_s) noexcept {
-  const double time_us = 1e6 * time_s;
-  return std::abs(time_us) <= static_cast<double>(kLatest_us) ? std::llround(time_us) : kNoTime_us;
-}
-
-std::int64_t to_us(std::uint64_t ticks, std::uint64_t ticks_per_s) noexcept {
+std::int64_t ticks_to_us(std::uint64_t ticks, std::uint64_t ticks_per_s) noexcept {
   const std::uint64_t whole_s = ticks / ticks_per_s, rest = ticks % ticks_per_s;
   if (whole_s > static_cast<std::uint64_t>(kLatest_us / 1'000'000)) return kNoTime_us;
   return static_cast<std::int64_t>(1'000'000 * whole_s + 1'000'000 * rest / ticks_per_s);
 }
 
-void skip_texts(Cursor& cursor) {
+void skip_texts(LittleEndianCursor& cursor) {
   const std::size_t texts = cursor.count(1);
   for (std::size_t k = 0; k < texts && cursor.ok(); ++k) cursor.take_text();
 }
 
-void take_rigid_body_model(Cursor& cursor, const NatnetVersion& version, BodyNames* names) {
+void take_rigid_body_model(LittleEndianCursor& cursor, const NatnetVersion& version,
+                           BodyNames* names) {
   const std::string_view name = cursor.take_text();
   const auto id = cursor.take<std::int32_t>();
   cursor.skip(4 + kPoint);  // parent, offset
@@ -107,7 +100,8 @@ void take_rigid_body_model(Cursor& cursor, const NatnetVersion& version, BodyNam
 }
 
 /// False where the kind is not known, so that its end cannot be found.
-bool take_model(Cursor& cursor, Model kind, const NatnetVersion& version, BodyNames& names) {
+bool take_model(LittleEndianCursor& cursor, Model kind, const NatnetVersion& version,
+                BodyNames& names) {
   switch (kind) {
     case Model::marker_set:
       cursor.take_text();
@@ -149,7 +143,7 @@ bool take_model(Cursor& cursor, Model kind, const NatnetVersion& version, BodyNa
 
 std::span<const std::byte> natnet_contents(std::span<const std::byte> packet,
                                            NatnetMessage kind) noexcept {
-  Cursor cursor(packet);
+  LittleEndianCursor cursor(packet);
   const auto message = cursor.take<std::uint16_t>();
   const auto bytes = cursor.take<std::uint16_t>();
   if (!cursor.ok() || message != static_cast<std::uint16_t>(kind) || bytes != cursor.left())
@@ -167,7 +161,7 @@ std::vector<std::byte> natnet_request(NatnetMessage kind) {
 }
 
 bool decode_natnet_server(std::span<const std::byte> contents, NatnetDialect& dialect) noexcept {
-  Cursor cursor(contents);
+  LittleEndianCursor cursor(contents);
   cursor.skip(kApplicationName + 4);  // and its version
   NatnetDialect found;
   found.version.major = cursor.take<std::uint8_t>();
@@ -182,12 +176,12 @@ bool decode_natnet_server(std::span<const std::byte> contents, NatnetDialect& di
 
 bool decode_natnet_models(std::span<const std::byte> contents, const NatnetVersion& version,
                           BodyNames& names) noexcept {
-  Cursor cursor(contents);
+  LittleEndianCursor cursor(contents);
   const std::size_t models = cursor.count(4 + 1);
   for (std::size_t k = 0; k < models && cursor.ok(); ++k) {
     const auto kind = static_cast<Model>(cursor.take<std::int32_t>());
     if (version >= kSizes) {
-      Cursor model(cursor.take_bytes(cursor.count(1)));
+      LittleEndianCursor model(cursor.take_bytes(cursor.count(1)));
       if (cursor.ok() && kind == Model::rigid_body) take_model(model, kind, version, names);
       if (!model.ok()) return false;
     } else if (!take_model(cursor, kind, version, names)) {
@@ -200,7 +194,7 @@ bool decode_natnet_models(std::span<const std::byte> contents, const NatnetVersi
 bool decode_natnet_frame(std::span<const std::byte> contents, const NatnetDialect& dialect,
                          SentFrame& frame, NatnetNews& news) noexcept {
   const NatnetVersion& version = dialect.version;
-  Cursor cursor(contents);
+  LittleEndianCursor cursor(contents);
   frame.frame_number = cursor.take<std::int32_t>();
   skip_section(cursor, version, kLeastSet, [&] {
     cursor.take_text();
@@ -226,7 +220,7 @@ bool decode_natnet_frame(std::span<const std::byte> contents, const NatnetDialec
   news = {.models_changed = (flags & kModelsChanged) != 0,
           .version_changed = (flags & kVersionChanged) != 0};
   frame.sender_time_us = exposure_ticks != 0 && dialect.ticks_per_s != 0
-                             ? to_us(exposure_ticks, dialect.ticks_per_s)
+                             ? ticks_to_us(exposure_ticks, dialect.ticks_per_s)
                              : to_us(timestamp_s);
   return true;
 }
@@ -234,16 +228,16 @@ bool decode_natnet_frame(std::span<const std::byte> contents, const NatnetDialec
 namespace {
 
 /// A packet: its length follows when it is complete.
-class Packet {
+class NatnetPacket {
  public:
-  Packet(NatnetMessage kind, std::vector<std::byte>& out) : out_(out), writer_(out) {
+  NatnetPacket(NatnetMessage kind, std::vector<std::byte>& out) : out_(out), writer_(out) {
     out.clear();
     writer_.put(static_cast<std::uint16_t>(kind));
     writer_.put(std::uint16_t{0});
   }
-  ~Packet() { writer_.put_at(2, static_cast<std::uint16_t>(out_.size() - 4)); }
-  Packet(const Packet&) = delete;
-  Packet& operator=(const Packet&) = delete;
+  ~NatnetPacket() { writer_.put_at(2, static_cast<std::uint16_t>(out_.size() - 4)); }
+  NatnetPacket(const NatnetPacket&) = delete;
+  NatnetPacket& operator=(const NatnetPacket&) = delete;
 
   ByteWriter* operator->() { return &writer_; }
   /// Puts the size of what `write` puts before it, where the version has sizes.
@@ -268,7 +262,7 @@ class Packet {
 }  // namespace
 
 void encode_natnet_server(const NatnetDialect& dialect, std::vector<std::byte>& out) {
-  Packet packet(NatnetMessage::server_info, out);
+  NatnetPacket packet(NatnetMessage::server_info, out);
   packet->put_text("softarm-plant");
   out.resize(4 + kApplicationName);
   for (const int number : {1, 0, 0, 0, dialect.version.major, dialect.version.minor, 0, 0})
@@ -278,7 +272,7 @@ void encode_natnet_server(const NatnetDialect& dialect, std::vector<std::byte>& 
 
 void encode_natnet_models(const NatnetVersion& version, const BodyNames& names,
                           std::vector<std::byte>& out) {
-  Packet packet(NatnetMessage::models, out);
+  NatnetPacket packet(NatnetMessage::models, out);
   packet->put(static_cast<std::int32_t>(names.bodies().size()));
   for (const NamedBody& body : names.bodies()) {
     packet->put(static_cast<std::int32_t>(Model::rigid_body));
@@ -296,7 +290,7 @@ void encode_natnet_models(const NatnetVersion& version, const BodyNames& names,
 void encode_natnet_frame(const SentFrame& frame, const NatnetDialect& dialect,
                          std::vector<std::byte>& out) {
   const NatnetVersion& version = dialect.version;
-  Packet packet(NatnetMessage::frame, out);
+  NatnetPacket packet(NatnetMessage::frame, out);
   packet->put(static_cast<std::int32_t>(frame.frame_number));
   packet.empty_section(version);  // marker sets
   packet.empty_section(version);  // other markers

@@ -11,23 +11,21 @@
 namespace softarm {
 namespace {
 
-using Cursor = ByteCursor<std::endian::big>;
-
 /// Length, which counts the terminating zero, and characters.
-void skip_text(Cursor& cursor) {
+void skip_text(BigEndianCursor& cursor) {
   const auto text = cursor.take_bytes(cursor.count(1));
   if (text.empty() || text.back() != std::byte{0}) cursor.fail();
 }
 
-constexpr std::size_t kPoint = 3 * 4;
+constexpr std::size_t kPosition = 3 * 4;
 constexpr std::size_t kLeastMarkerSet = 4 + 1 + 4;
-constexpr std::size_t kLeastRigidBody = 4 + kPoint + 4 * 4 + 4 + 4 + 2;
-constexpr std::size_t kMarkerOfBody = kPoint + 4 + 4;
-constexpr std::size_t kLeastSkeleton = 4 + 4;
-constexpr std::size_t kMarker = 4 + kPoint + 4 + 2;
-constexpr std::size_t kForceplate = 4 + 2 * kPoint;
+constexpr std::size_t kLeastRigidBody = 4 + kPosition + 4 * 4 + 4 + 4 + 2;
+constexpr std::size_t kMarkerOfBody = kPosition + 4 + 4;
+constexpr std::size_t kLeastBodies = 4 + 4;
+constexpr std::size_t kMarker = 4 + kPosition + 4 + 2;
+constexpr std::size_t kForceplate = 4 + 2 * kPosition;
 
-SentBody take_body(Cursor& cursor) {
+SentBody take_rigid_body(BigEndianCursor& cursor) {
   SentBody body;
   body.id = cursor.take<std::int32_t>();
   for (double& each : body.position) each = static_cast<double>(cursor.take<float>());
@@ -38,42 +36,36 @@ SentBody take_body(Cursor& cursor) {
   return body;
 }
 
-void skip_marker_sets(Cursor& cursor) {
+void skip_marker_sets(BigEndianCursor& cursor) {
   const std::size_t sets = cursor.count(kLeastMarkerSet);
   for (std::size_t i = 0; i < sets && cursor.ok(); ++i) {
     skip_text(cursor);
-    cursor.skip_list(kPoint);
+    cursor.skip_list(kPosition);
   }
 }
 
-void skip_skeletons(Cursor& cursor) {
-  const std::size_t skeletons = cursor.count(kLeastSkeleton);
+void skip_skeletons(BigEndianCursor& cursor) {
+  const std::size_t skeletons = cursor.count(kLeastBodies);
   for (std::size_t i = 0; i < skeletons && cursor.ok(); ++i) {
     cursor.skip(4);
     const std::size_t bodies = cursor.count(kLeastRigidBody);
-    for (std::size_t j = 0; j < bodies && cursor.ok(); ++j) take_body(cursor);
+    for (std::size_t j = 0; j < bodies && cursor.ok(); ++j) take_rigid_body(cursor);
   }
-}
-
-/// What no clock relation takes where the time is nonsense.
-std::int64_t to_us(double time_s) noexcept {
-  const double time_us = 1e6 * time_s;
-  return std::abs(time_us) <= static_cast<double>(kLatest_us) ? std::llround(time_us)
-                                                              : kLatest_us + 1;
 }
 
 class OptitrackFormat final : public LcmMocapFormat<softarm_messages::optitrack_frame_t> {
  public:
   bool decode(std::span<const std::byte> bytes, SentFrame& frame) noexcept override {
-    Cursor cursor(bytes);
+    BigEndianCursor cursor(bytes);
     if (cursor.take<std::int64_t>() != softarm_messages::optitrack_frame_t::getHash()) return false;
     cursor.skip(8);  // utime, the sender's wall clock
     frame.frame_number = cursor.take<std::int32_t>();
     skip_marker_sets(cursor);
-    cursor.skip_list(kPoint);  // markers of no body
+    cursor.skip_list(kPosition);  // markers of no body
     frame.bodies = cursor.count(kLeastRigidBody);
     if (frame.bodies > SentFrame::kMostBodies) return false;
-    for (std::size_t i = 0; i < frame.bodies && cursor.ok(); ++i) frame.body[i] = take_body(cursor);
+    for (std::size_t i = 0; i < frame.bodies && cursor.ok(); ++i)
+      frame.body[i] = take_rigid_body(cursor);
     skip_skeletons(cursor);
     cursor.skip_list(kMarker);
     cursor.skip_list(kForceplate);

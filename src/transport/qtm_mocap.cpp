@@ -22,10 +22,7 @@ namespace {
 /// The names of very many bodies with all their markers fit.
 constexpr std::size_t kLargestPacket = 1 << 20;
 constexpr std::size_t kLargestRequest = 4096;
-constexpr int kMostPackets = 64;  ///< of one step
 constexpr std::int64_t kTryAgain_ns = 1'000'000'000;
-/// No answer, or no frame, for so long: everything is asked again.
-constexpr std::int64_t kSilent_ns = 2'000'000'000;
 
 class QtmConnection final : public MocapConnection {
  public:

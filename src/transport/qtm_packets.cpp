@@ -11,10 +11,8 @@
 namespace softarm {
 namespace {
 
-using Cursor = ByteCursor<std::endian::little>;
-
 constexpr std::uint32_t kSixDofWithResidual = 11;
-constexpr std::size_t kBody = (3 + 9 + 1) * 4;
+constexpr std::size_t kMatrixBody = (3 + 9 + 1) * 4;
 constexpr std::size_t kComponent = 8;  ///< its size and kind
 constexpr double kRotation = 1e-3;     ///< a matrix of floats is that close to a rotation
 
@@ -28,7 +26,7 @@ std::array<double, 4> quaternion(const Eigen::Matrix3d& matrix) {
   return {q.w(), q.x(), q.y(), q.z()};
 }
 
-SentBody take_body(Cursor& cursor, std::int32_t id) {
+SentBody take_body(LittleEndianCursor& cursor, std::int32_t id) {
   SentBody body{.id = id};
   for (double& each : body.position) each = static_cast<double>(cursor.take<float>());
   Eigen::Matrix3d matrix;
@@ -88,7 +86,7 @@ bool is_escaped(std::string_view escaped, std::string_view name) noexcept {
 }  // namespace
 
 std::optional<QtmHeader> qtm_header(std::span<const std::byte> bytes) noexcept {
-  Cursor cursor(bytes);
+  LittleEndianCursor cursor(bytes);
   QtmHeader header;
   header.size = cursor.take<std::uint32_t>();
   header.kind = static_cast<QtmMessage>(cursor.take<std::uint32_t>());
@@ -102,7 +100,7 @@ std::string_view qtm_text(std::span<const std::byte> contents) noexcept {
 }
 
 bool decode_qtm_frame(std::span<const std::byte> contents, SentFrame& frame) noexcept {
-  Cursor cursor(contents);
+  LittleEndianCursor cursor(contents);
   frame.sender_time_us = cursor.take<std::int64_t>();
   frame.frame_number = cursor.take<std::uint32_t>();
   frame.bodies = 0;
@@ -111,11 +109,12 @@ bool decode_qtm_frame(std::span<const std::byte> contents, SentFrame& frame) noe
   for (std::size_t k = 0; k < components && cursor.ok(); ++k) {
     const std::size_t size = cursor.take<std::uint32_t>();
     const auto kind = cursor.take<std::uint32_t>();
-    Cursor component(cursor.take_bytes(size < kComponent ? contents.size() : size - kComponent));
+    LittleEndianCursor component(
+        cursor.take_bytes(size < kComponent ? contents.size() : size - kComponent));
     if (!cursor.ok() || kind != kSixDofWithResidual) continue;
-    const std::size_t bodies = component.left() < 8 ? 0 : component.count(kBody);
+    const std::size_t bodies = component.left() < 8 ? 0 : component.count(kMatrixBody);
     component.skip(2 + 2);  // rates of dropped and late frames
-    if (found || !component.ok() || component.left() != bodies * kBody) return false;
+    if (found || !component.ok() || component.left() != bodies * kMatrixBody) return false;
     if (bodies > SentFrame::kMostBodies) return false;
     found = true;
     frame.bodies = bodies;
@@ -150,16 +149,16 @@ void read_qtm_names(std::string_view xml, BodyNames& names) noexcept {
 namespace {
 
 /// A packet: its size follows when it is complete.
-class Packet {
+class QtmPacket {
  public:
-  Packet(QtmMessage kind, std::vector<std::byte>& out) : out_(out), writer_(out) {
+  QtmPacket(QtmMessage kind, std::vector<std::byte>& out) : out_(out), writer_(out) {
     out.clear();
     writer_.put(std::uint32_t{0});
     writer_.put(static_cast<std::uint32_t>(kind));
   }
-  ~Packet() { writer_.put_at(0, static_cast<std::uint32_t>(out_.size())); }
-  Packet(const Packet&) = delete;
-  Packet& operator=(const Packet&) = delete;
+  ~QtmPacket() { writer_.put_at(0, static_cast<std::uint32_t>(out_.size())); }
+  QtmPacket(const QtmPacket&) = delete;
+  QtmPacket& operator=(const QtmPacket&) = delete;
   ByteWriter* operator->() { return &writer_; }
 
  private:
@@ -170,16 +169,16 @@ class Packet {
 }  // namespace
 
 void encode_qtm_text(QtmMessage kind, std::string_view text, std::vector<std::byte>& out) {
-  Packet packet(kind, out);
+  QtmPacket packet(kind, out);
   packet->put_text(text);
 }
 
 void encode_qtm_frame(const SentFrame& frame, std::vector<std::byte>& out) {
-  Packet packet(QtmMessage::data, out);
+  QtmPacket packet(QtmMessage::data, out);
   packet->put(frame.sender_time_us);
   packet->put(static_cast<std::uint32_t>(frame.frame_number));
   packet->put(std::uint32_t{1});  // components
-  packet->put(static_cast<std::uint32_t>(kComponent + 8 + kBody * frame.bodies));
+  packet->put(static_cast<std::uint32_t>(kComponent + 8 + kMatrixBody * frame.bodies));
   packet->put(kSixDofWithResidual);
   packet->put(static_cast<std::uint32_t>(frame.bodies));
   packet->put(std::uint32_t{0});  // rates of dropped and late frames

@@ -12,6 +12,11 @@
 
 namespace softarm {
 
+inline constexpr int kMostPackets = 64;  ///< that a source takes in one step
+/// No answer, or no frame, for so long: a source asks for everything again. The server may come
+/// back as another version.
+inline constexpr std::int64_t kSilent_ns = 2'000'000'000;
+
 /// Owns a descriptor.
 class Socket {
  public:

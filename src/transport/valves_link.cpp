@@ -11,7 +11,7 @@
 namespace softarm {
 namespace {
 
-constexpr int kCommandCapacity = 64, kRequestCapacity = 64;
+constexpr int kCommandCapacity = 64, kOperatorCapacity = 64;
 constexpr std::int64_t kStatusPeriod_ns = 100'000'000;
 
 void put(const Eigen::VectorXd& from_bar, std::vector<float>& to_bar) noexcept {
@@ -37,7 +37,7 @@ ValvesLink::ValvesLink(const LcmSettings& lcm, ValveDriver& driver)
   status_.actual_bar = measurement_.pressure_bar;
   node_.subscribe(lcm_.command_channel, kCommandCapacity,
                   [this](const ReceivedMessage& packet) { take(packet); });
-  node_.subscribe(lcm_.operator_channel, kRequestCapacity,
+  node_.subscribe(lcm_.operator_channel, kOperatorCapacity,
                   [this](const ReceivedMessage& packet) { take_request(packet); });
 }
 
@@ -83,7 +83,7 @@ void ValvesLink::take_until(std::int64_t deadline_ns) noexcept {
 void ValvesLink::drain(bool take) noexcept {
   discarding_ = !take;
   // The capacity of the queues: a flood of messages must not delay the loop.
-  node_.drain(kCommandCapacity + kRequestCapacity);
+  node_.drain(kCommandCapacity + kOperatorCapacity);
   discarding_ = false;
 }
 

@@ -38,8 +38,8 @@ def go_on_in_our_python():
 
 
 def own_url():
-    """A different one with every call."""
-    return f"udpm://239.255.76.67:{20000 + (32 * os.getpid() + next(_numbers)) % 12000}?ttl=0"
+    """A different one with every call, below those of the C++ tests (tests/own_url.hpp)."""
+    return f"udpm://239.255.76.67:{8000 + (32 * os.getpid() + next(_numbers)) % 12000}?ttl=0"
 
 
 # A machine that is busy with other things must look like nothing else.

@@ -1,8 +1,8 @@
 # softarm_module(NAME DEPENDS libraries PRIVATE_DEPENDS libraries): a module of the tree as a separate library, so that the linker
 # checks the direction of the arrows too. softarm_program(NAME DEPENDS ...): an executable.
 # softarm_tests(LABEL MODULE [REAL_TIME] [SLOW FILTER] DEPENDS ...): one test program from every *_test.cpp below the folder MODULE;
-# REAL_TIME for those that watch programs run in real time: one at a time, possibly beside a test that computes; those whose names
-# FILTER matches get the label slow instead.
+# REAL_TIME for those that watch programs run in real time: one of a test program at a time, beside other tests; those whose names
+# FILTER matches get the label slow instead, and run alone.
 
 include(SoftarmHeaders)
 
@@ -84,7 +84,7 @@ function(softarm_tests label module)
   set(usual "*")
   set(lock "")
   if(TESTS_REAL_TIME)
-    set(lock RESOURCE_LOCK real_time COST 100)  # one after another, so the first of them begins first
+    set(lock RESOURCE_LOCK ${target} COST 100)  # one after another, so the first of them begins first
   endif()
   if(TESTS_SLOW)
     set(usual "-${TESTS_SLOW}")
