@@ -98,6 +98,7 @@ void SoakArm::take_command(const ChamberCommand& command) {
 bool SoakArm::wait_for(const std::function<bool()>& reached, double patience_s) {
   return client_.wait_for(
       [&] {
+        if (client_.valves()) seen_of_valves_.insert(client_.valves()->reason);
         if (reached()) return true;
         speak(client_.now_ns());
         return false;
@@ -144,6 +145,11 @@ int SoakArm::fullest_chamber() const {
 
 double SoakArm::fullest_bar() const {
   return commanded_bar_.size() > 0 ? commanded_bar_.maxCoeff() : 0.0;
+}
+
+void SoakArm::forget() {
+  seen_.clear();
+  seen_of_valves_.clear();
 }
 
 bool SoakArm::left_active() const {
