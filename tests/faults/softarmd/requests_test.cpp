@@ -177,12 +177,13 @@ TEST_P(RequestFaults, AnEmergencyStopThatWasReportedIsKept) {
   std::vector<std::string> preloaded = clocks.preload();
   preloaded.push_back(std::string(SOFTARM_BINARY_DIR) + "/bin/softarmd");
   auto daemon = start("/env", preloaded);
-  ASSERT_TRUE(becomes(*this, Mode::wait_frames, Reason::frames_stale)) << daemon->printed();
+  ASSERT_TRUE(wait_for([&] { return mode() == Mode::wait_frames; })) << daemon->printed();
   clocks.slow_disk(test::kSecond / 5);
   client_->send(OperatorRequest::emergency_stop);
   ASSERT_TRUE(becomes(*this, Mode::fault, Reason::emergency_stop)) << daemon->printed();
   daemon->signal(SIGKILL);
   daemon->wait(5s);
+  client_->update(client_->now_ns());  // its last statuses
   statuses_ = 0;
   forget();
   daemon = start("softarmd");

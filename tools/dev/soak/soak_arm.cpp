@@ -86,10 +86,7 @@ void SoakArm::take_status(const ArmStatus& newest) {
 void SoakArm::take_command(const ChamberCommand& command) {
   ++commands_;
   commanded_bar_ = command.pressure_bar;
-  // To zero at once where the valves have vented, by their own account or because time has passed.
-  const double step_bar = steps_.take(command);
-  const bool gentle = step_bar <= largest_step_bar_ || commanded_bar_.isZero(0.0);
-  const bool inside = gentle && commanded_bar_.allFinite() &&
+  const bool inside = steps_.take(command) <= largest_step_bar_ && commanded_bar_.allFinite() &&
                       (commanded_bar_.array() >= lowest_bar_).all() &&
                       (commanded_bar_.array() <= highest_bar_).all();
   if (!inside) ++outside_;
