@@ -13,6 +13,8 @@
 #include <cstring>
 #include <stdexcept>
 #include <string_view>
+#include <tuple>
+#include <utility>
 
 #include "softarm/base/hash.hpp"
 
@@ -33,6 +35,30 @@ std::string file_name(const std::string& name) {
 
 [[noreturn]] void fail(const char* what) {
   throw std::runtime_error(fmt::format("{}: {}", what, std::strerror(errno)));
+}
+
+/// Its descriptor, and whether it was created. Everybody may write to /var/tmp: what is there may be
+/// a trap of somebody else. @throws std::runtime_error, fs::filesystem_error
+std::pair<int, bool> open_safely(const fs::path& file) {
+  const fs::path folder = file.parent_path();
+  if (fs::create_directories(folder)) fs::permissions(folder, fs::perms::owner_all);
+  struct stat about {};
+  if (lstat(folder.c_str(), &about) != 0) fail("its folder");
+  if (S_ISLNK(about.st_mode) && about.st_uid != geteuid() && about.st_uid != 0)
+    throw std::runtime_error("its folder is somebody else's link");
+  if (stat(folder.c_str(), &about) != 0) fail("its folder");
+  if (about.st_uid != geteuid()) throw std::runtime_error("its folder belongs to somebody else");
+
+  constexpr int kFlags = O_RDWR | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK;
+  int descriptor = ::open(file.c_str(), kFlags | O_CREAT | O_EXCL, 0600);
+  const bool is_new = descriptor >= 0;
+  if (!is_new) descriptor = ::open(file.c_str(), kFlags);
+  if (descriptor < 0) fail("it cannot be opened");
+  if (fstat(descriptor, &about) != 0 || !S_ISREG(about.st_mode)) {
+    ::close(descriptor);
+    throw std::runtime_error("it is not a file");
+  }
+  return {descriptor, is_new};
 }
 
 }  // namespace
@@ -71,23 +97,8 @@ FaultLatch::~FaultLatch() {
 }
 
 void FaultLatch::open() {
-  const fs::path folder = file_.parent_path();
-  if (fs::create_directories(folder)) fs::permissions(folder, fs::perms::owner_all);
-  // Everybody may write to /var/tmp: what is there may be a trap of somebody else.
-  struct stat about {};
-  if (lstat(folder.c_str(), &about) != 0) fail("its folder");
-  if (S_ISLNK(about.st_mode) && about.st_uid != geteuid() && about.st_uid != 0)
-    throw std::runtime_error("its folder is somebody else's link");
-  if (stat(folder.c_str(), &about) != 0) fail("its folder");
-  if (about.st_uid != geteuid()) throw std::runtime_error("its folder belongs to somebody else");
-
-  constexpr int kFlags = O_RDWR | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK;
-  descriptor_ = ::open(file_.c_str(), kFlags | O_CREAT | O_EXCL, 0600);
-  const bool is_new = descriptor_ >= 0;
-  if (!is_new) descriptor_ = ::open(file_.c_str(), kFlags);
-  if (descriptor_ < 0) fail("it cannot be opened");
-  if (fstat(descriptor_, &about) != 0 || !S_ISREG(about.st_mode))
-    throw std::runtime_error("it is not a file");
+  bool is_new = false;
+  std::tie(descriptor_, is_new) = open_safely(file_);
   if (!is_new) {
     std::array<char, kBytes + 1> bytes{};
     const ssize_t size = pread(descriptor_, bytes.data(), bytes.size(), 0);
@@ -102,7 +113,7 @@ void FaultLatch::open() {
   // Takes the bytes, and shows that it can be written.
   static_assert(kClear.size() < kBytes);
   wanted_ = found_.c_str();
-  if (!write(found_.c_str())) {
+  if (!write(found_.c_str()) || fdatasync(descriptor_) != 0) {
     if (is_new) unlink(file_.c_str());
     fail("it cannot be written");
   }
@@ -112,6 +123,21 @@ void FaultLatch::want(const char* reason) noexcept {
   wanted_.store(reason);
   changes_.fetch_add(1);
   changes_.notify_one();
+}
+
+/// Folders for temporary files are cleared now and then: what is written to a file without a name
+/// dies with this process.
+void FaultLatch::find_again() noexcept {
+  struct stat ours {
+  }, named{};
+  if (fstat(descriptor_, &ours) == 0 && lstat(file_.c_str(), &named) == 0 &&
+      ours.st_dev == named.st_dev && ours.st_ino == named.st_ino)
+    return;
+  try {
+    const int descriptor = open_safely(file_).first;
+    ::close(std::exchange(descriptor_, descriptor));
+  } catch (const std::exception&) {  // the old one is as good
+  }
 }
 
 bool FaultLatch::write(const char* reason) noexcept {
@@ -127,8 +153,7 @@ bool FaultLatch::write(const char* reason) noexcept {
     put(0, kFault);
     put(kFault.size(), reason);
   }
-  return pwrite(descriptor_, bytes.data(), bytes.size(), 0) == static_cast<ssize_t>(kBytes) &&
-         fdatasync(descriptor_) == 0;
+  return pwrite(descriptor_, bytes.data(), bytes.size(), 0) == static_cast<ssize_t>(kBytes);
 }
 
 void FaultLatch::write_until_end() noexcept {
@@ -136,7 +161,11 @@ void FaultLatch::write_until_end() noexcept {
   for (int seen = 0;;) {
     const bool last = ending_;
     const char* const wanted = wanted_;
-    if (std::strcmp(wanted, written) != 0 && write(wanted)) written = wanted;
+    const bool differs = std::strcmp(wanted, written) != 0;
+    if (differs) find_again();
+    const bool put = differs && write(wanted);
+    kept_ = seen;  // a process that is killed from here on has left it; or it cannot be kept
+    if (put && fdatasync(descriptor_) == 0) written = wanted;
     if (last) return;
     changes_.wait(seen);
     seen = changes_;

@@ -74,8 +74,8 @@ static void describe(Keys& key, SafetySettings& it) {
   KEY(oscillation_rad, from(0, 1),
       "amplitude of a coordinate's error that oscillates and does not fade: VENT; 0: not checked");
   KEY(oscillation_periods, from(1, 20), "for so many periods");
-  KEY(oscillation_lowest_hz, above(0, 1e3), "slower ones do not count");
-  KEY(oscillation_part, from(0, 100),
+  KEY(oscillation_lowest_hz, above(0, 1), "slower ones do not count");
+  KEY(oscillation_part, from(0, 1),
       "of what the reference itself does meanwhile: a smaller error follows the reference");
   KEY(length_warning, from(0, 1),
       "a segment's measured length off arm.length_m by more, over that: the status reports it; 0: "

@@ -49,7 +49,7 @@ void describe(Keys& key, ValveDriverSettings& it) {
       "before connecting again, at least 1.5 failsafe_timeout_s; doubles with every failure");
   KEY(longest_backoff_s, from(0.01, 600), "what it grows to");
   KEY(failsafe_timeout_s, above(0, 1), "silence of ours after which the terminal itself vents");
-  KEY(vented_bar, above(0, 1), "measured pressures up to this count as vented");
+  KEY(vented_bar, above(0, 0.3), "measured pressures up to this count as vented");
   KEY(stuck_bar, above(0, 100), "a pressure further from its set point than this ...");
   KEY(stuck_after_s, above(0, 5), "... for so long belongs to a stuck valve");
   KEY(stuck_vents, "a stuck valve vents the arm; false: it is only reported");

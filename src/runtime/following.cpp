@@ -68,9 +68,16 @@ void PressureWatch::measure(const PressureVector& measured_bar) noexcept {
 
 void PressureWatch::judge_repeats(const PressureVector& measured_bar) noexcept {
   stale_ = false;
+  // A vented valve may measure the same zero for ever.
+  const auto rests_at_zero = [&](Eigen::Index j) {
+    return known_ == 2 && std::max(now_.high[j], before_.high[j]) <= 0.0 &&
+           std::min(now_.low[j], before_.low[j]) >= 0.0 &&
+           std::abs(measured_bar[j]) <= tolerance_bar_;
+  };
   for (Eigen::Index j = 0; j < measured_bar.size(); ++j) {
     std::int64_t& moved_ns = moved_ns_[static_cast<std::size_t>(j)];
-    if (measured_ && measured_bar[j] == measured_bar_[j]) {
+    const bool repeats = measured_ && measured_bar[j] == measured_bar_[j];
+    if (repeats && !rests_at_zero(j)) {
       stale_ |= moved_ns != kNever && now_ns_ - moved_ns >= settling_ns_;
       continue;
     }

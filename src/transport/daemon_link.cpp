@@ -351,7 +351,7 @@ void DaemonLink::publish_law_state(std::int64_t now_ns, const TickOutput& output
 }
 
 void DaemonLink::publish_status(std::int64_t now_ns, const ControlPipeline& pipeline,
-                                const LoopTiming& timing) noexcept {
+                                const LoopTiming& timing, bool show) noexcept {
   messages_.set_status(timing.ticks, pipeline);
   auto& status = messages_.status;
   status.time_us = now_ns / 1000;
@@ -373,7 +373,7 @@ void DaemonLink::publish_status(std::int64_t now_ns, const ControlPipeline& pipe
     const auto k = static_cast<std::size_t>(why);
     status.law_answers[k] += counter(law_refused_[k]);
   }
-  if (!node_.publish(lcm_.status_channel, status)) ++unsent_;
+  if (show && !node_.publish(lcm_.status_channel, status)) ++unsent_;
   if (!messages_.set_observer(timing.ticks, pipeline)) return;
   messages_.observer.time_us = status.time_us;
   if (!node_.publish(lcm_.observer_channel, messages_.observer)) ++unsent_;

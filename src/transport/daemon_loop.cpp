@@ -13,6 +13,7 @@ namespace {
 /// Zero commands sent before leaving: one may be lost on the wire.
 constexpr int kLastCommands = 3;
 constexpr std::int64_t kRepeatPause_ns = 500'000;
+constexpr std::int64_t kMostNotKept_ns = 1'000'000'000;
 constexpr std::int64_t kManyMissed = 1'000'000;  // a larger count means nothing new; fits an int
 
 }  // namespace
@@ -52,6 +53,16 @@ void DaemonLoop::run(const std::function<bool()>& stop_requested,
   while (link_.repeat_record()) sleep_until_ns(monotonic_now_ns() + kRepeatPause_ns);
 }
 
+bool DaemonLoop::may_publish_status(std::int64_t now_ns, const TickOutput& output) noexcept {
+  const bool kept = !kept_ || kept_(output.mode, output.reason);
+  if (kept || output.mode != Mode::fault) {
+    not_kept_since_ns_ = kForever;
+    return true;
+  }
+  not_kept_since_ns_ = std::min(not_kept_since_ns_, now_ns);
+  return now_ns - not_kept_since_ns_ > kMostNotKept_ns;
+}
+
 void DaemonLoop::tick(std::int64_t woken_ns, bool stopping) noexcept {
   TickInput input = link_.collect(woken_ns);
   input.requests.shutdown = stopping;
@@ -62,7 +73,7 @@ void DaemonLoop::tick(std::int64_t woken_ns, bool stopping) noexcept {
   link_.publish_command(decided_ns, output);
   link_.publish_law_state(woken_ns, output);
   ++timing_.ticks;
-  link_.publish_status(woken_ns, pipeline_, timing_);
+  link_.publish_status(woken_ns, pipeline_, timing_, may_publish_status(woken_ns, output));
   link_.publish_record(input, output);
   if (timing_.ticks % ticks_per_second_ == 0) link_.publish_timing(woken_ns, timing_);
   if (input.law != nullptr)

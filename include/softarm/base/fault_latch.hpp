@@ -31,12 +31,16 @@ class FaultLatch {
 
   /// Has `reason` written, which must be in static storage. Neither waits nor allocates.
   void set(const char* reason) noexcept { want(reason); }
+  /// Whether what was asked for last would survive this process: it is in the file, on its way to
+  /// the disk. True as well where nothing can be kept. Neither waits nor allocates.
+  bool kept() const noexcept { return !thread_.joinable() || kept_ == changes_; }
   /// Has the absence of a FAULT written; likewise.
   void clear() noexcept { want(""); }
 
  private:
   void open();
   void want(const char* reason) noexcept;
+  void find_again() noexcept;
   bool write(const char* reason) noexcept;
   void write_until_end() noexcept;
 
@@ -45,6 +49,7 @@ class FaultLatch {
   int descriptor_ = -1;
   std::atomic<const char*> wanted_{""};
   std::atomic<int> changes_{0};
+  std::atomic<int> kept_{0};  ///< changes up to which all is in the file
   std::atomic<bool> ending_{false};
   std::thread thread_;
 };

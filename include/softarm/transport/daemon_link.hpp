@@ -63,9 +63,10 @@ class DaemonLink {
   void publish_command(std::int64_t now_ns, const TickOutput& output) noexcept;
   /// Publishes what an external law is to answer, if the tick has it. A shadow does not.
   void publish_law_state(std::int64_t now_ns, const TickOutput& output) noexcept;
-  /// Publishes the status of the tick, with overruns from `timing`.
+  /// Publishes the status of the tick, with overruns from `timing`; `show` is false where it is too
+  /// early to show it.
   void publish_status(std::int64_t now_ns, const ControlPipeline& pipeline,
-                      const LoopTiming& timing) noexcept;
+                      const LoopTiming& timing, bool show = true) noexcept;
   /// Publishes the histograms of `timing`.
   void publish_timing(std::int64_t now_ns, const LoopTiming& timing) noexcept;
   /// Publishes the inputs of the tick of the last command, and again the record of

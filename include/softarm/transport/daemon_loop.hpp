@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <utility>
 
 #include "softarm/runtime/control_pipeline.hpp"
 #include "softarm/transport/daemon_link.hpp"
@@ -28,6 +29,11 @@ class DaemonLoop {
   /// The first tick will find an emergency stop: a FAULT that nobody has acknowledged.
   void begin_stopped() noexcept { begin_stopped_ = true; }
 
+  /// From now on `kept` is asked in every tick, with what was decided, and no status shows FAULT
+  /// before it returns true: nobody relies on what dies with this process. A disk that does not
+  /// answer delays the statuses, not the commands, by at most a second.
+  void keep_faults(std::function<bool(Mode, Reason)> kept) { kept_ = std::move(kept); }
+
   /// Ticks until `stop_requested` returns true and every pressure has been commanded to zero.
   /// Neither allocates nor throws as long as the callbacks do not.
   void run(const std::function<bool()>& stop_requested,
@@ -42,10 +48,13 @@ class DaemonLoop {
 
  private:
   void tick(std::int64_t woken_ns, bool stopping) noexcept;
+  bool may_publish_status(std::int64_t now_ns, const TickOutput& output) noexcept;
 
   ControlPipeline pipeline_;
   DaemonLink link_;
   std::int64_t ticks_per_second_;
+  std::function<bool(Mode, Reason)> kept_;
+  std::int64_t not_kept_since_ns_ = kForever;
   bool judge_overruns_ = false;
   bool begin_stopped_ = false;
   int missed_in_row_ = 0;

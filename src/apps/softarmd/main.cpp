@@ -58,23 +58,28 @@ class Latched {
             path);
   }
   bool begins_stopped() const { return !latch_.found().empty(); }
-  void note(Mode mode, Reason reason) noexcept {
-    if (mode == Mode::fault) {
-      latch_.set(name(reason));
-    } else if (mode_ == Mode::fault) {
-      latch_.clear();
+  /// In every tick. Whether a FAULT is kept already.
+  bool keep(Mode mode, Reason reason) noexcept {
+    if (mode != mode_ || reason != reason_) {
+      if (mode == Mode::fault) {
+        latch_.set(name(reason));
+      } else if (mode_ == Mode::fault) {
+        latch_.clear();
+      }
     }
     mode_ = mode;
+    reason_ = reason;
+    return latch_.kept();
   }
 
  private:
   FaultLatch latch_;
   Mode mode_ = Mode::init;
+  Reason reason_ = Reason::none;
 };
 
 /// Prints every change of mode or reason, and what was refused; reports to the service manager.
-void run(DaemonLoop& loop, LineLog& log, ServiceNotifier& service, const LcmSettings& lcm,
-         Latched* latched) {
+void run(DaemonLoop& loop, LineLog& log, ServiceNotifier& service, const LcmSettings& lcm) {
   Mode mode = Mode::init;
   Reason reason = Reason::none;
   LoopReports reports(loop, lcm, log);
@@ -84,7 +89,6 @@ void run(DaemonLoop& loop, LineLog& log, ServiceNotifier& service, const LcmSett
              if (output.mode != mode || output.reason != reason) {
                mode = output.mode;
                reason = output.reason;
-               if (latched != nullptr) latched->note(mode, reason);
                const bool verdict = reason == Reason::frames_refused;
                log.add("{:.3f} s: {} ({}{}{})", to_seconds(report.since_start_ns), name(mode),
                        name(reason), verdict ? ": " : "", verdict ? name(output.refusal) : "");
@@ -137,8 +141,10 @@ int serve(const std::string& path, bool shadow) {
                    .build = build_text()},
                   shadow);
   apply_realtime_settings(realtime);
+  if (latched)
+    loop.keep_faults([&](Mode mode, Reason reason) { return latched->keep(mode, reason); });
   if (latched && latched->begins_stopped()) loop.begin_stopped();
-  run(loop, log, service, lcm, latched ? &*latched : nullptr);
+  run(loop, log, service, lcm);
   log.finish();
   print_summary(loop);
   return kExitOk;

@@ -8,6 +8,7 @@
 #include <softarm_messages/operator_command_t.hpp>
 #include <softarm_messages/pressure_command_t.hpp>
 
+#include "dev/clock/preloaded_clocks.hpp"
 #include "faults/softarmd/fault_test.hpp"
 #include "softarm/transport/message_decoding.hpp"
 
@@ -163,6 +164,32 @@ TEST_P(RequestFaults, AnEmergencyStopSurvivesTheDaemon) {
   statuses_ = 0;
   daemon = start("softarmd");
   EXPECT_TRUE(wait_for([&] { return under_pressure(); })) << seen_text() << daemon->printed();
+}
+
+// Whoever has seen FAULT may rely on it, at once and on a slow disk.
+TEST_P(RequestFaults, AnEmergencyStopThatWasReportedIsKept) {
+#ifdef SOFTARM_SANITIZED
+  GTEST_SKIP() << "a sanitizer's runtime must be loaded first";
+#endif
+  configure(*this);
+  PreloadedClocks clocks((folder_ / "clocks").string());
+  ASSERT_TRUE(clocks.made());
+  std::vector<std::string> preloaded = clocks.preload();
+  preloaded.push_back(std::string(SOFTARM_BINARY_DIR) + "/bin/softarmd");
+  auto daemon = start("/env", preloaded);
+  ASSERT_TRUE(wait_for([&] { return mode() == Mode::wait_frames; })) << daemon->printed();
+  clocks.slow_disk(test::kSecond / 5);
+  client_->send(OperatorRequest::emergency_stop);
+  ASSERT_TRUE(becomes(*this, Mode::fault, Reason::emergency_stop)) << daemon->printed();
+  daemon->signal(SIGKILL);
+  daemon->wait(5s);
+  client_->update(client_->now_ns());  // its last statuses
+  statuses_ = 0;
+  forget();
+  daemon = start("softarmd");
+  EXPECT_TRUE(wait_for([&] { return statuses_ > 0; }));
+  EXPECT_EQ(seen_.size(), 1u) << seen_text();
+  EXPECT_TRUE(saw(Mode::fault, Reason::emergency_stop)) << seen_text();
 }
 
 TEST_P(RequestFaults, WhereTheFaultCannotBeKeptThatIsReported) {

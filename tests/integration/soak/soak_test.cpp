@@ -53,7 +53,7 @@ TEST_F(Soak, TenSecondsOfRandomFaultsAreAnsweredAndRecovered) {
   EXPECT_GE(found["injected"].as<int>(), 3);
   EXPECT_EQ(found["recovered"].as<int>(), found["injected"].as<int>());
   EXPECT_EQ(found["commands_outside_limits"].as<int>(), 0);
-  ASSERT_EQ(found["processes"].size(), 2u);
+  ASSERT_EQ(found["processes"].size(), 3u);
   for (const YAML::Node& process : found["processes"]) {
     EXPECT_GT(process["at_start"]["resident_kib"].as<int>(), 1000) << soak->printed();
     EXPECT_GT(process["at_end"]["descriptors"].as<int>(), 3) << soak->printed();

@@ -1,7 +1,7 @@
 // softarm-valves before a terminal that refuses, ignores or loses what is written, or obeys another
 // master too. What must hold: the arm vents, nothing keeps it from venting, and the exit code is 0
 // only where its measured pressure fell.
-#include "integration/valves/bad_terminal.hpp"
+#include "dev/fault/bad_terminal.hpp"
 
 #include <gtest/gtest.h>
 
@@ -13,11 +13,9 @@
 namespace softarm {
 namespace {
 
-using test::BadTerminal;
 using test::kChambers;
 using test::Process;
 using test::ValvesProgram;
-using test::Writes;
 
 class ValvesAtABadTerminal : public ValvesProgram {
  protected:

@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <fstream>
 #include <string>
+#include <thread>
 
 namespace softarm {
 namespace {
@@ -33,8 +34,14 @@ TEST_F(FaultLatchFile, KeepsWhatWasSetLast) {
   EXPECT_EQ(found(), "");
   {
     FaultLatch latch(folder_ / "state", "CHANNEL on udpm://1");
+    EXPECT_TRUE(latch.kept());
     latch.set("valves_silent");
     latch.set("emergency_stop");
+    while (!latch.kept()) std::this_thread::yield();
+    std::ifstream kept(latch.file());
+    std::string text(14, ' ');
+    kept.seekg(6).read(text.data(), 14);
+    EXPECT_EQ(text, "emergency_stop");
   }
   EXPECT_EQ(found(), "emergency_stop");
   EXPECT_EQ(found(), "emergency_stop") << "looking is no acknowledgement";
@@ -59,6 +66,22 @@ TEST_F(FaultLatchFile, WhatCannotBeUnderstoodIsAFault) {
   }
 }
 
+TEST_F(FaultLatchFile, SurvivesThatItsFolderIsCleared) {
+  {
+    FaultLatch latch(folder_ / "state", "CHANNEL on udpm://1");
+    fs::remove_all(folder_);
+    latch.set("emergency_stop");
+  }
+  EXPECT_EQ(found(), "emergency_stop");
+  {
+    FaultLatch latch(folder_ / "state", "CHANNEL on udpm://1");
+    fs::rename(latch.file(), folder_ / "restored");
+    fs::copy_file(folder_ / "restored", latch.file());
+    latch.clear();
+  }
+  EXPECT_EQ(found(), "");
+}
+
 TEST_F(FaultLatchFile, ReportsWhatItCannotKeep) {
   fs::create_directories(folder_);
   std::ofstream(folder_ / "taken") << "a file";
@@ -66,6 +89,7 @@ TEST_F(FaultLatchFile, ReportsWhatItCannotKeep) {
   EXPECT_NE(latch.problem(), "");
   EXPECT_EQ(latch.found(), "");
   latch.set("emergency_stop");  // harmless
+  EXPECT_TRUE(latch.kept()) << "nobody waits for what never comes";
   const FaultLatch full("/dev/full", "CHANNEL");
   EXPECT_NE(full.problem(), "");
 }

@@ -48,6 +48,11 @@ const Slip kRefused[] = {
     {"control: {max_speed_radps: 1000}\n", "", "control.max_speed_radps", "100] rad/s"},
     {"control: {valve_lag_s: 5}\n", "", "control.valve_lag_s", "[0, 0.5] s"},
     {"control: {delay_s: 5}\n", "", "control.delay_s", "[0, 0.5] s"},
+    // An unstable loop swings at one to two Hz, whatever its reference does.
+    {"", "safety: {oscillation_lowest_hz: 1000}", "daemon.safety.oscillation_lowest_hz",
+     "(0, 1] Hz"},
+    {"", "safety: {oscillation_part: 50}", "daemon.safety.oscillation_part", "[0, 1]"},
+    {"valves: {vented_bar: 0.9}\n", "", "valves.vented_bar", "(0, 0.3] bar"},
     // Ticks at which frames, or the ramp, cannot do their work.
     {"",
      "rate_hz: 5, safety: {valve_silence_s: 1, deadman_timeout_s: 1, vent_after_s: 2}, lcm: "

@@ -195,6 +195,20 @@ TEST_F(Watches, AReadBackThatRepeatsWhileItsCommandMovesIsAFault) {
   }
 }
 
+// Somebody has opened the supply since; vented valves go on to measure the same zero.
+TEST_F(Watches, ValvesThatRepeatZeroAtRestAreNoReasonAnyMore) {
+  PipelineBench bench(experiment);
+  bench.leak = [](PressureVector& measured_bar) { measured_bar.setZero(); };
+  ASSERT_GT(bench.run_to(Mode::fault, 3000), 0);
+  EXPECT_EQ(bench.pipeline.output().reason, Reason::pressure_mismatch);
+  bench.run(1000);
+  bench.input.requests.disarm = true;
+  bench.tick();
+  bench.input.requests = {};
+  bench.run(10);
+  EXPECT_NE(bench.pipeline.output().reason, Reason::pressure_mismatch);
+}
+
 // Valves at rest, and coarse ones, repeat what they measure.
 TEST_F(Watches, ACoarseReadBackIsNotStale) {
   PipelineBench bench(experiment);

@@ -89,5 +89,18 @@ TEST_F(DaemonLoopOverUdp, AFunctionCalledAfterEachTickSeesWhatWasDecided) {
   EXPECT_EQ(first, Mode::wait_frames);
 }
 
+TEST_F(DaemonLoopOverUdp, AFaultIsPublishedOnceItIsKept) {
+  constexpr int kAfter = 15;
+  int asked = 0, ticks = 0;
+  loop->keep_faults([&](Mode mode, Reason) { return mode != Mode::fault || ++asked > kAfter; });
+  loop->begin_stopped();
+  loop->run([&] { return ticks >= 30; }, [&](const DaemonLoop::Report&) { ++ticks; });
+  hear(static_cast<std::size_t>(ticks));
+  ASSERT_EQ(commands.size(), static_cast<std::size_t>(ticks)) << "commands do not wait";
+  ASSERT_FALSE(statuses.empty());
+  EXPECT_EQ(statuses.front().tick, kAfter + 1);
+  EXPECT_EQ(statuses.front().mode, static_cast<std::int8_t>(Mode::fault));
+}
+
 }  // namespace
 }  // namespace softarm

@@ -169,6 +169,14 @@ TEST_F(GuardLimits, WithoutAnEchoAPressureThatFallsByMoreThanABoundIsAGap) {
   stuck_at = 0.5;
   cycle();
   EXPECT_EQ(guard->state(), ValveState::degraded) << "that was a fall";
+  // Nor one that was not measured in the cycle before: in two it may have.
+  stuck_at = -1.0;
+  make();
+  run();
+  cycle(LinkResult::no_answer);
+  stuck_at = 0.0;
+  cycle();
+  EXPECT_EQ(guard->state(), ValveState::running);
   stuck_at = -1.0;
   make();
   commanding = true;
@@ -178,6 +186,31 @@ TEST_F(GuardLimits, WithoutAnEchoAPressureThatFallsByMoreThanABoundIsAGap) {
     cycle();
     ASSERT_EQ(guard->state(), ValveState::running) << k;
   }
+}
+
+// A check of the time-out that got no answer is tolerated, but the cycle writes no pressure.
+TEST_F(GuardLimits, NoPressureIsWrittenWhereTheTimeOutIsNotKnown) {
+  make();
+  run();
+  for (int k = 0; k < 1000 && !guard->failsafe_due(now); ++k) {
+    measure();
+    if (!guard->failsafe_due(now)) guard->written(LinkResult::ok, now);
+  }
+  ASSERT_TRUE(guard->failsafe_due(now));
+  EXPECT_TRUE(guard->may_write());
+  guard->failsafe_checked(LinkResult::no_answer, false, now);
+  EXPECT_EQ(guard->state(), ValveState::running);
+  EXPECT_FALSE(guard->may_write());
+}
+
+TEST_F(GuardLimits, OnlyACommandThatIsWrittenHasANumber) {
+  make();
+  run();
+  EXPECT_EQ(guard->sequence(), sequence - 1);
+  guard->emergency_stop();
+  cycle();
+  EXPECT_EQ(guard->commands().sequence(), sequence - 1) << "it is in force";
+  EXPECT_EQ(guard->sequence(), CommandExpiry::kNoSequence);
 }
 
 TEST_F(GuardLimits, AValveIsStuckBeyondItsBoundForLongerThanItsTime) {

@@ -1,4 +1,4 @@
-// The clocks of a process started with `preload` (wall_clock.cpp), which a test or a soak sets.
+// The clocks, and the disk, of a process started with `preload` (wall_clock.cpp), which a test or a soak sets.
 #pragma once
 
 #include <fcntl.h>
@@ -40,9 +40,11 @@ class PreloadedClocks {
   void suspend(std::int64_t ns) { shared_[2] += ns; }
   /// The machine was paused, and neither clock counted it.
   void lose(std::int64_t ns) { shared_[3] += ns; }
+  /// From now on its disk takes so long to write at a position of a file.
+  void slow_disk(std::int64_t ns) { shared_[4] = ns; }
 
  private:
-  static constexpr std::size_t kSize = 4 * sizeof(std::int64_t);
+  static constexpr std::size_t kSize = 5 * sizeof(std::int64_t);
 
   std::string path_;
   std::atomic<std::int64_t>* shared_ = nullptr;

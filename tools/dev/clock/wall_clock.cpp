@@ -1,6 +1,6 @@
 // A library to be loaded before all others (LD_PRELOAD): while a program runs, its wall clock is
-// set, its machine seems to have been suspended, or paused without any clock counting it; for that
-// program alone.
+// set, its machine seems to have been suspended, or paused without any clock counting it, its disk
+// is slow; for that program alone.
 #include <fcntl.h>
 #include <sys/mman.h>
 #include <sys/socket.h>
@@ -21,9 +21,10 @@ struct Shared {
   std::atomic<std::int64_t> reads;         ///< of the wall clock, written here
   std::atomic<std::int64_t> suspended_ns;  ///< CLOCK_BOOTTIME is ahead by so much
   std::atomic<std::int64_t> lost_ns;  ///< CLOCK_MONOTONIC and CLOCK_BOOTTIME are behind by so much
+  std::atomic<std::int64_t> disk_ns;  ///< a write at a position takes so long
 };
 
-/// The file that SOFTARM_WALL_CLOCK names, four 64-bit integers.
+/// The file that SOFTARM_WALL_CLOCK names, five 64-bit integers.
 Shared* shared() {
   static Shared* const memory = [] {
     const char* path = std::getenv("SOFTARM_WALL_CLOCK");
@@ -70,6 +71,16 @@ extern "C" time_t time(time_t* out) noexcept {
   clock_gettime(CLOCK_REALTIME, &now);
   if (out != nullptr) *out = now.tv_sec;
   return now.tv_sec;
+}
+
+extern "C" ssize_t pwrite(int file, const void* bytes, size_t size, off_t at) {
+  timespec delay{};
+  add(delay, shared()->disk_ns.load());
+  nanosleep(&delay, nullptr);
+  return syscall(SYS_pwrite64, file, bytes, size, at);
+}
+extern "C" ssize_t pwrite64(int file, const void* bytes, size_t size, off64_t at) {
+  return pwrite(file, bytes, size, at);
 }
 
 // The kernel stamps packets with its wall clock as they come in: SO_TIMESTAMP, which LCM asks for.

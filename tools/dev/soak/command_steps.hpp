@@ -13,7 +13,8 @@ namespace softarm {
 class CommandSteps {
  public:
   /// Largest change of a pressure from the command before this one, bar; 0 where that is not known,
-  /// as commands between them were lost.
+  /// as commands between them were lost, and of a command of zero: the daemon goes there at once
+  /// where the valves report that they have vented.
   double take(const ChamberCommand& command) {
     const bool expired = has_expired(time_us_, command.validity_us, command.time_us);
     if (expired) before_bar_.setZero(command.pressure_bar.size());
@@ -23,10 +24,11 @@ class CommandSteps {
                        (expired && (command.sequence == sequence_ + 2 || command.sequence == 1));
     const Eigen::Index chambers = std::min(before_bar_.size(), command.pressure_bar.size());
     const double largest_bar =
-        known && chambers > 0 ? (command.pressure_bar.head(chambers) - before_bar_.head(chambers))
-                                    .cwiseAbs()
-                                    .maxCoeff()
-                              : 0.0;
+        known && chambers > 0 && !command.pressure_bar.isZero(0.0)
+            ? (command.pressure_bar.head(chambers) - before_bar_.head(chambers))
+                  .cwiseAbs()
+                  .maxCoeff()
+            : 0.0;
     sequence_ = command.sequence;
     time_us_ = command.time_us;
     before_bar_ = command.pressure_bar;

@@ -86,10 +86,7 @@ void SoakArm::take_status(const ArmStatus& newest) {
 void SoakArm::take_command(const ChamberCommand& command) {
   ++commands_;
   commanded_bar_ = command.pressure_bar;
-  // To zero at once where the valves have vented, by their own account or because time has passed.
-  const double step_bar = steps_.take(command);
-  const bool gentle = step_bar <= largest_step_bar_ || commanded_bar_.isZero(0.0);
-  const bool inside = gentle && commanded_bar_.allFinite() &&
+  const bool inside = steps_.take(command) <= largest_step_bar_ && commanded_bar_.allFinite() &&
                       (commanded_bar_.array() >= lowest_bar_).all() &&
                       (commanded_bar_.array() <= highest_bar_).all();
   if (!inside) ++outside_;
@@ -98,6 +95,7 @@ void SoakArm::take_command(const ChamberCommand& command) {
 bool SoakArm::wait_for(const std::function<bool()>& reached, double patience_s) {
   return client_.wait_for(
       [&] {
+        if (client_.valves()) seen_of_valves_.insert(client_.valves()->reason);
         if (reached()) return true;
         speak(client_.now_ns());
         return false;
@@ -144,6 +142,11 @@ int SoakArm::fullest_chamber() const {
 
 double SoakArm::fullest_bar() const {
   return commanded_bar_.size() > 0 ? commanded_bar_.maxCoeff() : 0.0;
+}
+
+void SoakArm::forget() {
+  seen_.clear();
+  seen_of_valves_.clear();
 }
 
 bool SoakArm::left_active() const {

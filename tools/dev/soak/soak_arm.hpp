@@ -13,6 +13,7 @@
 #include "softarm/client/arm_client.hpp"
 #include "softarm/config/experiment.hpp"
 #include "softarm/control/reference.hpp"
+#include "softarm/valves/valve_guard.hpp"
 
 namespace softarm {
 
@@ -54,7 +55,8 @@ class SoakArm {
   /// Every mode and reason since the last `forget`.
   bool saw(Mode mode, Reason reason) const { return seen_.count({mode, reason}) > 0; }
   bool left_active() const;
-  void forget() { seen_.clear(); }
+  bool saw(ValveReason reason) const { return seen_of_valves_.count(reason) > 0; }
+  void forget();
 
   /// Of all daemons there were.
   std::int64_t ticks() const { return ended_.ticks + status_.tick; }
@@ -80,6 +82,7 @@ class SoakArm {
   std::int64_t next_reference_ns_, next_go_ns_, motion_began_ns_ = 0;
   DeadMan dead_man_ = DeadMan::go;
   std::set<std::pair<Mode, Reason>> seen_;
+  std::set<ValveReason> seen_of_valves_;
   int active_in_row_ = 0;
   struct {
     std::int64_t ticks = 0, overruns = 0;

@@ -11,9 +11,13 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr double kBurstFrom_bar = 0.5;
+constexpr double kPressure_bar = 0.5;  ///< from which a valve can be seen to fail
 
 }  // namespace
+
+void SoakRun::make_pressure() {
+  arm_.wait_for([&] { return arm_.fullest_bar() > kPressure_bar; }, kPatience_s);
+}
 
 void SoakRun::send_hostile_bytes() {
   const std::vector<Packet> packets = hostile_packets(experiment_.transport.lcm);
@@ -79,7 +83,7 @@ void SoakRun::cause(const SoakFault& fault) {
       const int segments = experiment_.arm.size();
       chosen.body = std::uniform_int_distribution(1, segments)(random_);
       if (chosen.kind == FaultKind::burst) {
-        arm_.wait_for([&] { return arm_.fullest_bar() > kBurstFrom_bar; }, kPatience_s);
+        make_pressure();
         chosen.body = arm_.fullest_chamber();
       }
       return relay_.set(chosen);
@@ -108,12 +112,34 @@ void SoakRun::cause(const SoakFault& fault) {
       return send_foreign_command();
     case SoakAction::lose_commands:
       relay_.lose_commands(true);
-      arm_.wait_for([&] { return arm_.plant_vented(); }, kPatience_s);
+      arm_.wait_for([&] { return arm_.plant_vented() && terminal_vented(); }, kPatience_s);
       return relay_.lose_commands(false);
     case SoakAction::suspend:
       return clocks_->suspend(to_ns(30.0));
     case SoakAction::pause_plant:
       return plant_.process->stop();
+    case SoakAction::refuse_writes:
+    case SoakAction::ignore_writes:
+    case SoakAction::stick_valves:
+      make_pressure();
+      terminal_.writes = fault.action == SoakAction::refuse_writes   ? Writes::refused
+                         : fault.action == SoakAction::ignore_writes ? Writes::ignored
+                                                                     : Writes::stuck;
+      return;
+    case SoakAction::lose_timeout:
+      return terminal_.lose_timeout();
+    case SoakAction::suspend_valves:
+      return valves_clocks_->suspend(to_ns(30.0));
+    case SoakAction::pause_valves:
+      valves_.process->stop();
+      arm_.wait_for([&] { return arm_.left_active(); }, kPatience_s);
+      arm_.wait_for([&] { return terminal_vented(); }, kPatience_s);
+      return valves_.process->signal(SIGCONT);
+    case SoakAction::kill_valves:
+      make_pressure();
+      valves_.process->signal(SIGKILL);
+      valves_.process->wait(5s);
+      return;
     case SoakAction::restart_plant:
       plant_.process->signal(SIGKILL);
       plant_.process->wait(5s);

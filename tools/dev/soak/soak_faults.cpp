@@ -17,6 +17,11 @@ constexpr SoakFault harmless(const char* name, const char* relay_fault,
           Mode::active, Reason::none,      counter,     counts};
 }
 
+constexpr SoakFault of_valves(const char* name, SoakAction action,
+                              ValveReason valves = ValveReason::none) {
+  return {name, action, "", 0.0, Mode::vent, Reason::none, nullptr, 0, valves};
+}
+
 constexpr std::array kFaults{
     frames_away("stop", "stop"),
     frames_away("occlude", "occlude"),
@@ -60,6 +65,13 @@ constexpr std::array kFaults{
     SoakFault{"commands lost", SoakAction::lose_commands, "", 0.0, Mode::vent,
               Reason::command_expired},
     SoakFault{"suspended", SoakAction::suspend, "", 0.0, Mode::vent, Reason::time_gap},
+    of_valves("terminal refuses", SoakAction::refuse_writes, ValveReason::zero_unconfirmed),
+    of_valves("terminal ignores", SoakAction::ignore_writes, ValveReason::zero_unconfirmed),
+    of_valves("valves stuck", SoakAction::stick_valves, ValveReason::stuck_valve),
+    of_valves("time-out lost", SoakAction::lose_timeout, ValveReason::failsafe_changed),
+    of_valves("driver stopped", SoakAction::pause_valves),
+    of_valves("driver suspended", SoakAction::suspend_valves, ValveReason::time_gap),
+    of_valves("driver killed", SoakAction::kill_valves),
     SoakFault{"plant replaced", SoakAction::restart_plant, "", 0.0, Mode::vent,
               Reason::frames_stale},
     SoakFault{"daemon ended", SoakAction::end_daemon},

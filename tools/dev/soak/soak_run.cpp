@@ -9,6 +9,7 @@
 #include "apps/progress.hpp"
 #include "apps/signals.hpp"
 #include "softarm/base/clock.hpp"
+#include "softarm/base/realtime.hpp"
 #include "softarm/base/time.hpp"
 #include "softarm/config/load.hpp"
 #include "softarm/transport/settings.hpp"
@@ -33,13 +34,17 @@ std::filesystem::path write_soak_config(const SoakOptions& options) {
       "  safety: {{arming: explicit, frame_period_s: 0.002, hold_after_s: 0.1, vent_after_s: "
       "0.25,\n"
       "    valve_readback: true, valve_silence_s: 0.4, deadman_timeout_s: 1.5}}\n"
+      "{}"
       "plant: {{mocap: {{rate_hz: 500}}}}\n",
-      std::filesystem::absolute(options.config).string(), options.seed, 20000 + getpid() % 12000);
+      std::filesystem::absolute(options.config).string(), options.seed, 20000 + getpid() % 12000,
+      // Above a flood that is sent at the priority of this program.
+      runs_under_fifo() ? "  realtime: {fifo: true, priority: 50}\n" : "");
   const auto files = load_experiment(options.config).files;
   write_text(path, text, files);
   write_text(options.folder / "soak_plant.yaml",
              fmt::format("include: soak.yaml\nname: soak_plant\n"
-                         "daemon: {{lcm: {{command_channel: {}}}}}\n",
+                         "daemon: {{lcm: {{command_channel: {}, measurement_channel: "
+                         "SOFTARM_SOAK_UNHEARD}}}}\n",
                          kSoakValvesChannel),
              files);
   return path;
@@ -53,12 +58,17 @@ SoakRun::SoakRun(const SoakOptions& options)
       arm_(experiment_),
       relay_(experiment_.transport.lcm, kSensorSuffix, 0, kSoakValvesChannel),
       sender_(experiment_.transport.lcm.url),
+      terminal_(static_cast<int>(experiment_.valves.order.size())),
       daemon_{.name = "softarmd", .arguments = {config_.string()}, .process = {}, .record = {}},
       plant_{.name = "softarm-plant",
              .arguments = {(options.folder / "soak_plant.yaml").string(), "--sensor-suffix",
                            kSensorSuffix},
              .process = {},
              .record = {}},
+      valves_{.name = "softarm-valves",
+              .arguments = {(options.folder / "soak_valves.yaml").string()},
+              .process = {},
+              .record = {}},
       replace_until_s_(std::min(0.25 * options.duration_s, 300.0)),
       warm_up_s_(replace_until_s_ + std::min(0.125 * options.duration_s, 60.0)) {
   setenv("XDG_STATE_HOME", std::filesystem::absolute(options.folder).c_str(), 1);  // of the daemon
@@ -70,9 +80,20 @@ SoakRun::SoakRun(const SoakOptions& options)
                       "softarm, the only frames that a soak can corrupt", "another source");
   for (const SoakFault& fault : soak_faults()) counters_.faults.push_back({.name = fault.name});
 #ifndef SOFTARM_SANITIZED  // whose runtime must be loaded first
-  if (std::filesystem::exists(SOFTARM_WALL_CLOCK))
+  if (std::filesystem::exists(SOFTARM_WALL_CLOCK)) {
     clocks_.emplace((options.folder / "clocks").string());
+    valves_clocks_.emplace((options.folder / "valves_clocks").string());
+  }
 #endif
+  write_text(options.folder / "soak_valves.yaml",
+             fmt::format("include: soak.yaml\nname: soak_valves\n"
+                         "daemon: {{lcm: {{command_channel: {}, measurement_channel: {}{}}}}}\n"
+                         "valves: {{port: {}, terminal: cpx_vppm, rate_hz: 100, "
+                         "response_timeout_s: 0.009,\n"
+                         "  tolerated_failures: 10, failsafe_timeout_s: 0.3}}\n",
+                         kSoakValvesChannel, experiment_.transport.lcm.measurement_channel,
+                         kSensorSuffix, terminal_.port()),
+             experiment_.files);
 }
 
 double SoakRun::passed_s() const { return to_seconds(monotonic_now_ns() - start_ns_); }
@@ -81,9 +102,10 @@ void SoakRun::start(Program& program) {
   const int number = program.process ? ++program.record.instances : 1;
   std::string path = program_beside_this(program.name);
   std::vector<std::string> arguments = program.arguments;
-  if (&program == &daemon_ && clocks_) {
+  const auto& clocks = &program == &daemon_ ? clocks_ : valves_clocks_;
+  if (&program != &plant_ && clocks) {
     arguments.insert(arguments.begin(), path);
-    const std::vector<std::string> preload = clocks_->preload();
+    const std::vector<std::string> preload = clocks->preload();
     arguments.insert(arguments.begin(), preload.begin(), preload.end());
     path = "env";
   }
@@ -102,7 +124,7 @@ void SoakRun::end(Program& program) {
 
 /// A process that ended by itself ends the soak.
 void SoakRun::look_after_processes() {
-  for (Program* program : {&daemon_, &plant_}) {
+  for (Program* program : {&daemon_, &plant_, &valves_}) {
     const int code = program->process->wait(0ms);
     if (code < 0) continue;
     counters_.troubles.push_back(fmt::format("{} ended by itself after {:.1f} s, exit code {}",
@@ -112,7 +134,7 @@ void SoakRun::look_after_processes() {
 }
 
 void SoakRun::measure_after_warm_up(double now_s) {
-  for (Program* program : {&daemon_, &plant_}) {
+  for (Program* program : {&daemon_, &plant_, &valves_}) {
     ProcessRecord& record = program->record;
     const auto use = process_use(program->process->pid());
     if (!use) continue;
@@ -164,7 +186,9 @@ const SoakFault& SoakRun::next_fault(double now_s) {
     }
     const SoakFault& fault = faults[cycle_.back()];
     cycle_.pop_back();
-    if (fault.action == SoakAction::suspend && !clocks_) continue;
+    if (!clocks_ &&
+        (fault.action == SoakAction::suspend || fault.action == SoakAction::suspend_valves))
+      continue;
     if (!fault.replaces_process() || now_s < replace_until_s_) return fault;
   }
 }
@@ -173,6 +197,14 @@ bool SoakRun::answered(const SoakFault& fault, std::int64_t counter_before) {
   if (fault.counter != nullptr)
     return arm_.wait_for(
         [&] { return arm_.status().*fault.counter >= counter_before + fault.counts; }, kPatience_s);
+  if (fault.of_valves())
+    return arm_.wait_for(
+        [&] {
+          return arm_.left_active() &&
+                 (terminal_vented() || fault.action == SoakAction::stick_valves) &&
+                 (fault.valves == ValveReason::none || arm_.saw(fault.valves));
+        },
+        kPatience_s);
   if (fault.mode == Mode::active)  // a daemon that is no more
     return arm_.wait_for([&] { return arm_.plant_vented(); }, kPatience_s);
   return arm_.wait_for([&] { return arm_.saw(fault.mode, fault.reason); }, kPatience_s);
@@ -181,6 +213,8 @@ bool SoakRun::answered(const SoakFault& fault, std::int64_t counter_before) {
 void SoakRun::clear(const SoakFault& fault) {
   relay_.set({});
   arm_.set_dead_man(SoakArm::DeadMan::go);
+  terminal_.writes = Writes::obeyed;
+  if (fault.action == SoakAction::kill_valves) start(valves_);
   if (fault.action == SoakAction::pause_plant) plant_.process->signal(SIGCONT);
   if (fault.action == SoakAction::restart_plant) start(plant_);
   if (fault.action == SoakAction::end_daemon || fault.action == SoakAction::kill_daemon)
@@ -233,20 +267,23 @@ void SoakRun::soak() {
 SoakCounters SoakRun::run() {
   start_ns_ = monotonic_now_ns();
   start(plant_);
+  start(valves_);
   start(daemon_);
   if (operate_until_active(kPatience_s)) {
-    for (Program* program : {&daemon_, &plant_})
+    for (Program* program : {&daemon_, &plant_, &valves_})
       program->record.at_start = process_use(program->process->pid()).value_or(ProcessUse{});
     soak();
   } else if (!stop_) {
     counters_.troubles.push_back(
         fmt::format("not ACTIVE within {:g} s, but {} ({})\n{}{}", kPatience_s, name(arm_.mode()),
-                    name(arm_.reason()), daemon_.process->printed(), plant_.process->printed()));
+                    name(arm_.reason()), daemon_.process->printed(),
+                    plant_.process->printed() + valves_.process->printed()));
   }
   if (!stop_) {
     end(daemon_);
     arm_.wait_for([] { return false; }, 0.1);  // its last messages
     end(plant_);
+    end(valves_);
   }
   counters_.duration_s = passed_s();
   counters_.warm_up_s = warm_up_s_;
@@ -256,7 +293,8 @@ SoakCounters SoakRun::run() {
   counters_.commands = arm_.commands();
   counters_.commands_outside_limits = arm_.commands_outside_limits();
   counters_.straight_poses = arm_.straight_poses();
-  for (const Program* program : {&daemon_, &plant_}) counters_.processes.push_back(program->record);
+  for (const Program* program : {&daemon_, &plant_, &valves_})
+    counters_.processes.push_back(program->record);
   return counters_;
 }
 

@@ -12,6 +12,7 @@
 
 #include "dev/child_process.hpp"
 #include "dev/clock/preloaded_clocks.hpp"
+#include "dev/fault/bad_terminal.hpp"
 #include "dev/fault/fault_relay.hpp"
 #include "dev/fault/raw_packets.hpp"
 #include "dev/soak/soak_arm.hpp"
@@ -28,13 +29,14 @@ struct SoakOptions {
   std::filesystem::path folder;  ///< for the configuration and what the processes print
 };
 
-/// The plant listens to this channel, to which commands are passed on.
+/// The plant and the valve driver listen to this channel, to which commands are passed on.
 inline constexpr const char* kSoakValvesChannel = "SOFTARM_SOAK_VALVES";
 
 /// Writes the soak's own configuration into the folder and returns its path: the experiment with
 /// tick and motion capture at 500 Hz, live references, explicit arming, read-back, a dead-man
-/// input, thresholds that a busy machine does not reach by itself, and a separate port. The plant's,
-/// soak_plant.yaml, is the same with another channel for commands.
+/// input, thresholds that a busy machine does not reach by itself, and a separate port. The plant's
+/// and the valve driver's, soak_plant.yaml and soak_valves.yaml, are the same with other channels:
+/// the daemon hears the pressures that the driver reads from the terminal.
 std::filesystem::path write_soak_config(const SoakOptions& options);
 
 class SoakRun {
@@ -69,6 +71,8 @@ class SoakRun {
   void pause_daemon(const std::function<void()>& meanwhile);
   void insist_on_stop();
   void send_foreign_command();
+  bool terminal_vented() const { return terminal_.pressure_bar() <= 0.1; }
+  void make_pressure();
   void send_hostile_bytes();
   void flood(
       const std::string& channel, const std::function<void()>& meanwhile = [] {});
@@ -81,8 +85,10 @@ class SoakRun {
   SoakArm arm_;
   FaultRelay relay_;
   RawSender sender_;
-  std::optional<PreloadedClocks> clocks_;  ///< of the daemon, where their library was built
-  Program daemon_, plant_;
+  BadTerminal terminal_;
+  /// Of the daemon and of the valve driver, where their library was built.
+  std::optional<PreloadedClocks> clocks_, valves_clocks_;
+  Program daemon_, plant_, valves_;
   std::vector<std::size_t> cycle_;  ///< faults still to come before all have been there once more
   std::int64_t start_ns_ = 0;
   double replace_until_s_, warm_up_s_;

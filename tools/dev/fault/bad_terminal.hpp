@@ -15,10 +15,15 @@
 #include "softarm/valves/register_map.hpp"
 #include "softarm/valves/simulated_terminal.hpp"
 
-namespace softarm::test {
+namespace softarm {
 
 /// What happens to set points that are written.
-enum class Writes { obeyed, refused, ignored };
+enum class Writes {
+  obeyed,
+  refused,
+  ignored,  ///< although acknowledged
+  stuck     ///< read back as written, but the valves stay where they are
+};
 
 /// The worst of its kind as to its time-out: whatever is asked of it keeps its outputs, reads and
 /// refused requests too. Its valves follow with a lag of 20 ms.
@@ -42,6 +47,8 @@ class BadTerminal : private RegisterBank {
   int timeout_ms() const { return timeout_ms_; }
 
   std::atomic<Writes> writes{Writes::obeyed};
+  /// As another master would: its outputs stay for ever from now on.
+  void lose_timeout() { loses_timeout_ = true; }
   mutable std::atomic<int> requests{0};  ///< of all clients; a test may set it
 
  private:
@@ -81,13 +88,18 @@ class BadTerminal : private RegisterBank {
         terminal_.measure(bar_);
         server_.serve(*this);
       }
+      if (loses_timeout_.exchange(false)) {
+        const auto at = static_cast<std::size_t>(map_.timeout_address);
+        for (int k = 0; k < map_.timeout_words; ++k)
+          terminal_.registers()[at + static_cast<std::size_t>(k)] = 0;
+      }
       const double timeout_s = terminal_.timeout_s();
       if (timeout_s > 0.0 && monotonic_now_ns() - fed_ns_ > to_ns(timeout_s)) {
         terminal_.reset_outputs();
         const auto all = terminal_.registers();
         std::copy(all.begin(), all.end(), kept_.begin());
       }
-      bar_ += 0.1 * (terminal_.set_points_bar() - bar_);
+      if (writes != Writes::stuck) bar_ += 0.1 * (terminal_.set_points_bar() - bar_);
       pressure_bar_ = bar_.maxCoeff();
       timeout_ms_ = static_cast<int>(1e3 * timeout_s + 0.5);
     }
@@ -100,9 +112,10 @@ class BadTerminal : private RegisterBank {
   Eigen::VectorXd bar_;
   ModbusServer server_{0};
   mutable std::int64_t fed_ns_ = 0;
+  std::atomic<bool> loses_timeout_{false};
   std::atomic<double> pressure_bar_{0.0};
   std::atomic<int> timeout_ms_{0};
   std::jthread thread_;
 };
 
-}  // namespace softarm::test
+}  // namespace softarm
