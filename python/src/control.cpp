@@ -145,7 +145,9 @@ void bind_allocator(py::module_& module) {
           py::arg("tau_actuation_nm"),
           "Pressures (bar) nearest the bias that give s tau, and s of every segment: below 1 "
           "where\n"
-          "the chambers cannot reach tau (2n, N m) within their limits.")
+          "the chambers cannot reach tau (2n, N m) within their limits. For a generalized force in "
+          "u:\n"
+          "allocate(solve(arm.actuation_matrix(u), force)).")
       .def(
           "generalized_force",
           [](const PressureAllocator& allocator, const VectorXd& pressures) {
