@@ -198,7 +198,8 @@ class Allocator:
     def allocate(self, tau_actuation_nm: numpy.ndarray) -> tuple:
         """
         Pressures (bar) nearest the bias that give s tau, and s of every segment: below 1 where
-        the chambers cannot reach tau (2n, N m) within their limits.
+        the chambers cannot reach tau (2n, N m) within their limits. For a generalized force in u:
+        allocate(solve(arm.actuation_matrix(u), force)).
         """
     def generalized_force(self, pressure_bar: numpy.ndarray) -> numpy.ndarray:
         """

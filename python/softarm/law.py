@@ -89,7 +89,7 @@ def answer_daemon(answers, experiment, duration_s=None):
     """Answers a running softarmd until `duration_s` have passed, or for ever. Returns the statistics of ACTIVE: a dict."""
     client = softarm.ArmClient(experiment)
     end = None if duration_s is None else time.monotonic() + duration_s
-    squares, count, silent = 0.0, 0, False
+    squares, count, silent, shown = 0.0, 0, False, None
     while end is None or time.monotonic() < end:
         state = client.wait_for_law_state(0.5)
         if state is None:
@@ -100,6 +100,10 @@ def answer_daemon(answers, experiment, duration_s=None):
             continue
         silent = False
         client.answer_law(state, *answers(state))
+        now = client.status and (client.status.mode, client.status.reason)
+        if now != shown:
+            shown = now
+            print(f"softarm law: {now[0]}" + ("" if now[1] == "none" else f" ({now[1]})"), file=sys.stderr, flush=True)
         if state.mode == "ACTIVE":
             squares += float(np.mean((state.u_ref - state.u) ** 2))
             count += 1

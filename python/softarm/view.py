@@ -19,6 +19,7 @@ POINTS_PER_SEGMENT = 12
 PATH_POINTS = 400
 PLOT_S = 10.0
 FRAME_S = 1.0 / 30.0
+SILENT_S = 1.0
 MEASURED, REFERENCE, TRUTH, TIP = (31, 119, 180), (44, 160, 44), (150, 150, 150), (235, 80, 10)
 EMPTY, FULL = np.array([70, 110, 200]), np.array([220, 60, 40])
 
@@ -37,28 +38,40 @@ class Picture:
 
     def error_mrad(self):
         """Reference minus estimate, largest component; NaN where there is no reference."""
-        if self.u_ref.size != self.u.size or not np.all(np.isfinite(self.u_ref)):
+        if self.u_ref.size != self.u.size or self.u.size == 0 or not np.all(np.isfinite(self.u_ref)):
             return float("nan")
         return 1e3 * float(np.max(np.abs(self.u_ref - self.u)))
 
 
-def live_pictures(client):
-    """Pictures of a running arm at most every FRAME_S; None where it is silent for a second."""
+def live_pictures(client, step=lambda may_fill: None):
+    """Pictures of a running arm every FRAME_S, of a simulated one also without a daemon; None where all is silent for a second.
+
+    Meanwhile it calls `step` at least every 5 ms: whether the arm is simulated and no daemon reports.
+    """
     start_us = None
+    tick, heard, plant_us, moved = -1, time.monotonic(), -1, -1e9
     while True:
-        if not client.wait_for_status(1.0):
-            yield None
-            continue
-        status = client.status
-        start_us = start_us or status.time_us
-        true = client.plant.u if client.plant else np.empty(0)
-        pressure = client.measured_bar if client.measured_bar is not None else status.pressure_bar
-        yield Picture(
-            (status.time_us - start_us) / 1e6, status.mode, status.reason, status.u, status.u_ref, true, pressure
-        )
-        end = time.monotonic() + FRAME_S
+        end, new = time.monotonic() + FRAME_S, False
         while (left := end - time.monotonic()) > 0.0:
-            client.update(left)
+            client.update(min(left, 0.005))
+            step(end - heard > SILENT_S and end - moved < SILENT_S)
+        status, plant, now = client.status, client.plant, time.monotonic()
+        if status is not None and status.tick != tick:
+            tick, heard, new = status.tick, now, True
+        if plant is not None and plant.time_us != plant_us:
+            plant_us, moved = plant.time_us, now
+        pressure = client.measured_bar
+        true = plant.u if plant else np.empty(0)
+        if new:
+            start_us = start_us or status.time_us
+            bar = status.pressure_bar if pressure is None else pressure
+            yield Picture((status.time_us - start_us) / 1e6, status.mode, status.reason, status.u, status.u_ref, true, bar)
+        elif now - heard > SILENT_S and now - moved < SILENT_S:
+            start_us = start_us or plant_us
+            bar = plant.pressure_bar if pressure is None else pressure
+            yield Picture((plant_us - start_us) / 1e6, "NO DAEMON", "none", client.seen_u, np.empty(0), true, bar)
+        elif now - heard > SILENT_S:
+            yield None
 
 
 def read_log(path, experiment, config):
@@ -92,6 +105,50 @@ def read_csv(path, experiment):
         Picture(float(row["t_s"]), row["mode"], row["reason"], u[k], u_ref[k], u_true[k], pressures[k])
         for k, row in enumerate(rows)
     ]
+
+
+class ByHand:
+    """Sliders for the chambers of a simulated arm that no daemon commands."""
+
+    def __init__(self, gui, experiment, say):
+        self._experiment, self._say, self._client = experiment, say, None
+        highest_bar = experiment.pressure_limits_bar[1]
+        with gui.add_folder("pressures by hand, in bar", visible=False) as self.folder:
+            self.fill = gui.add_checkbox("fill the chambers", False)
+            self.sliders = [
+                gui.add_slider(f"{segment + 1}.{chamber + 1}", 0.0, highest_bar, highest_bar / 100.0, 0.0)
+                for segment, count in enumerate(experiment.chambers)
+                for chamber in range(count)
+            ]
+
+    def step(self, may_fill):
+        """Sends the set points when they are due; call it more often than every 10 ms."""
+        if self._client is None:
+            if self.folder.visible != may_fill:
+                self.folder.visible = may_fill
+            if may_fill and self.fill.value:
+                self._begin()
+            return
+        self._client.update()
+        if may_fill and self.fill.value:
+            self._client.command_chambers(np.array([slider.value for slider in self.sliders]))
+        else:
+            self.end()
+
+    def _begin(self):
+        try:
+            client = softarm.ArmClient(self._experiment)
+            client.lock_commands()
+            self._client = client
+        except RuntimeError as error:
+            self.fill.value = False
+            self._say(f"pressures by hand: {error}")
+
+    def end(self):
+        """Vents, and gives the command channel back."""
+        if self._client is not None:
+            self._client.vent_to_rest()
+        self._client = None
 
 
 class View:
@@ -157,6 +214,10 @@ class View:
                 yield self._requests.pop(0)
 
         return pending
+
+    def add_hand(self, experiment):
+        """Sliders for a simulated arm, shown where no daemon reports."""
+        return ByHand(self.server.gui, experiment, self.say)
 
     def add_player(self):
         """Pause and speed of a recorded run."""
@@ -243,11 +304,13 @@ def main(config, log, host, port, control):
         print(f"softarm view: {error}", file=sys.stderr)
         return 1
     print(f"softarm view: http://{host}:{view.server.get_port()} (Ctrl-C ends it)", flush=True)
+    hand = None
     try:
         if pictures:
             play(view, pictures)
         pending = view.add_control(client) if control else tuple
-        for picture in live_pictures(client):
+        hand = view.add_hand(experiment) if control else None
+        for picture in live_pictures(client, hand.step if hand else lambda may_fill: None):
             for request in pending():
                 view.say(f"{request}: {client.request(request)}")
             if picture is None:
@@ -256,6 +319,9 @@ def main(config, log, host, port, control):
                 view.show(picture)
     except KeyboardInterrupt:
         return 0
+    finally:
+        if hand:
+            hand.end()
 
 
 if __name__ == "__main__":

@@ -23,14 +23,16 @@ class Controller {
   explicit Controller(const Experiment& experiment)
       : dof_(experiment.arm.dof()), controller_(experiment.arm, experiment.control) {}
 
-  VectorXd compute(const VectorXd& u, const VectorXd& velocity, const VectorXd& u_ref,
-                   const VectorXd& velocity_ref, const VectorXd& acceleration_ref) {
+  py::object compute(const Vector& u, const Vector& velocity, const Vector& u_ref,
+                     const Vector& velocity_ref, const Vector& acceleration_ref) {
     ReferenceWindow window;
     window.now.u = expect(u_ref, dof_, "u_ref");
     window.now.velocity = expect(velocity_ref, dof_, "velocity_ref");
     window.now.acceleration = expect(acceleration_ref, dof_, "acceleration_ref");
     controller_.compute(expect(u, dof_, "u"), expect(velocity, dof_, "velocity"), window, out_);
-    return out_.tau_actuation_nm;
+    Result tau(dof_);
+    tau.vector = out_.tau_actuation_nm;
+    return tau.array;
   }
 
  private:
@@ -143,7 +145,9 @@ void bind_allocator(py::module_& module) {
           py::arg("tau_actuation_nm"),
           "Pressures (bar) nearest the bias that give s tau, and s of every segment: below 1 "
           "where\n"
-          "the chambers cannot reach tau (2n, N m) within their limits.")
+          "the chambers cannot reach tau (2n, N m) within their limits. For a generalized force in "
+          "u:\n"
+          "allocate(solve(arm.actuation_matrix(u), force)).")
       .def(
           "generalized_force",
           [](const PressureAllocator& allocator, const VectorXd& pressures) {

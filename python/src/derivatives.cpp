@@ -13,16 +13,16 @@ using Eigen::VectorXd;
 
 MatrixXd square(const Arm& arm) { return {arm.parameters.dof(), arm.parameters.dof()}; }
 
-py::tuple forward_dynamics_derivatives(Arm& arm, ConstVectorRef u, ConstVectorRef velocity,
-                                       ConstVectorRef force) {
-  VectorXd acceleration(arm.parameters.dof());
+py::tuple forward_dynamics_derivatives(Arm& arm, const Vector& u, const Vector& velocity,
+                                       const Vector& force) {
+  Result acceleration(arm.parameters.dof());
   MatrixXd by_u = square(arm), by_velocity = square(arm), by_force = square(arm);
   if (!arm.derivatives().forward_dynamics(arm.u(u), arm.u(velocity, "velocity"),
-                                          arm.u(force, "generalized_force_nm"), acceleration, by_u,
-                                          by_velocity, by_force)) {
+                                          arm.u(force, "generalized_force_nm"), acceleration.vector,
+                                          by_u, by_velocity, by_force)) {
     throw std::domain_error("the inertia matrix is not positive definite in double precision");
   }
-  return py::make_tuple(acceleration, by_u, by_velocity, by_force);
+  return py::make_tuple(acceleration.array, by_u, by_velocity, by_force);
 }
 
 }  // namespace
@@ -36,7 +36,7 @@ void bind_derivatives(py::class_<Arm>& type) {
           "by_force @ (its slope) to the second.")
       .def(
           "inverse_dynamics_by_u",
-          [](Arm& arm, ConstVectorRef u, ConstVectorRef velocity, ConstVectorRef acceleration) {
+          [](Arm& arm, const Vector& u, const Vector& velocity, const Vector& acceleration) {
             MatrixXd by_u = square(arm);
             arm.derivatives().inverse_dynamics_by_u(arm.u(u), arm.u(velocity, "velocity"),
                                                     arm.u(acceleration, "acceleration"), by_u);
@@ -48,7 +48,7 @@ void bind_derivatives(py::class_<Arm>& type) {
           "by u'': B.")
       .def(
           "static_stiffness",
-          [](Arm& arm, ConstVectorRef u) {
+          [](Arm& arm, const Vector& u) {
             MatrixXd by_u = square(arm);
             arm.derivatives().static_stiffness(arm.u(u), by_u);
             return by_u;
@@ -59,7 +59,7 @@ void bind_derivatives(py::class_<Arm>& type) {
           "by solve(static_stiffness(u), allocator.input_matrix) for 1 bar in each chamber.")
       .def(
           "actuation_slope",
-          [](const Arm& arm, ConstVectorRef u, ConstVectorRef tau) {
+          [](const Arm& arm, const Vector& u, const Vector& tau) {
             MatrixXd by_u = square(arm);
             actuation_slope(arm.parameters, arm.u(u), arm.u(tau, "tau_actuation_nm"), by_u);
             return by_u;

@@ -80,7 +80,7 @@ std::vector<Eigen::Isometry3d> segment_ends(const ArmParameters& arm, ConstVecto
   return ends;
 }
 
-MatrixXd centre_line(const Arm& arm, ConstVectorRef u, int points_per_segment) {
+MatrixXd centre_line(const Arm& arm, const Vector& u, int points_per_segment) {
   if (points_per_segment < 1) {
     throw std::invalid_argument("points_per_segment: expected a number >= 1");
   }
@@ -113,15 +113,7 @@ VectorXd column_of(const Arm& arm, double SegmentParameters::*member) {
   return values;
 }
 
-/// A result that is written where numpy will read it.
-struct Result {
-  explicit Result(Eigen::Index size) : array(size), vector(array.mutable_data(), size) {}
-  py::array_t<double> array;
-  Eigen::Map<VectorXd> vector;
-};
-
-py::array_t<double> forward(Arm& arm, ConstVectorRef u, ConstVectorRef velocity,
-                            ConstVectorRef force) {
+py::object forward(Arm& arm, const Vector& u, const Vector& velocity, const Vector& force) {
   Result acceleration(arm.parameters.dof());
   if (!forward_dynamics(arm.parameters, arm.workspace, arm.u(u), arm.u(velocity, "velocity"),
                         arm.u(force, "generalized_force_nm"), acceleration.vector)) {
@@ -130,8 +122,7 @@ py::array_t<double> forward(Arm& arm, ConstVectorRef u, ConstVectorRef velocity,
   return acceleration.array;
 }
 
-py::array_t<double> inverse(Arm& arm, ConstVectorRef u, ConstVectorRef velocity,
-                            ConstVectorRef acceleration) {
+py::object inverse(Arm& arm, const Vector& u, const Vector& velocity, const Vector& acceleration) {
   Result out(arm.parameters.dof());
   arm.u(velocity, "velocity");
   inverse_dynamics(arm.parameters, arm.workspace, arm.u(u), velocity, velocity,
@@ -140,7 +131,7 @@ py::array_t<double> inverse(Arm& arm, ConstVectorRef u, ConstVectorRef velocity,
   return out.array;
 }
 
-MatrixXd whole_actuation_matrix(const Arm& arm, ConstVectorRef u) {
+MatrixXd whole_actuation_matrix(const Arm& arm, const Vector& u) {
   arm.u(u);
   MatrixXd A = MatrixXd::Zero(arm.parameters.dof(), arm.parameters.dof());
   for (int i = 0; i < arm.parameters.dof(); i += 2) {
@@ -152,7 +143,7 @@ MatrixXd whole_actuation_matrix(const Arm& arm, ConstVectorRef u) {
 void bind_kinematics(py::class_<Arm>& type) {
   type.def(
           "segment_poses",
-          [](const Arm& arm, ConstVectorRef u) {
+          [](const Arm& arm, const Vector& u) {
             return pose_array(segment_ends(arm.parameters, arm.u(u)));
           },
           py::arg("u"), "World pose of every segment's end, (n, 4, 4), m; (1).")
@@ -160,7 +151,7 @@ void bind_kinematics(py::class_<Arm>& type) {
            "Points on the arm from base to tip, (n points_per_segment + 1, 3), m, world.")
       .def(
           "mass_centres",
-          [](const Arm& arm, ConstVectorRef u) {
+          [](const Arm& arm, const Vector& u) {
             Eigen::Matrix3Xd centres(3, arm.parameters.size());
             mass_centres(arm.parameters, arm.u(u), centres);
             return MatrixXd(centres.transpose());
@@ -168,13 +159,15 @@ void bind_kinematics(py::class_<Arm>& type) {
           py::arg("u"), "Centre of mass of every segment, (n, 3), m, world; (5).")
       .def(
           "tip",
-          [](const Arm& arm, ConstVectorRef u) {
-            return Eigen::Vector3d(tip_position(arm.parameters, arm.u(u)));
+          [](const Arm& arm, const Vector& u) {
+            Result tip(3);
+            tip.vector = tip_position(arm.parameters, arm.u(u));
+            return tip.array;
           },
           py::arg("u"), "Position of the tip, (3,), m, world.")
       .def(
           "tip_jacobian",
-          [](const Arm& arm, ConstVectorRef u) {
+          [](const Arm& arm, const Vector& u) {
             Eigen::Matrix3Xd J(3, arm.parameters.dof());
             tip_jacobian(arm.parameters, arm.u(u), J);
             return MatrixXd(J);
@@ -182,7 +175,7 @@ void bind_kinematics(py::class_<Arm>& type) {
           py::arg("u"), "d tip / d u, (3, 2n), m/rad, world.")
       .def(
           "tip_jacobian_rate",
-          [](const Arm& arm, ConstVectorRef u, ConstVectorRef velocity) {
+          [](const Arm& arm, const Vector& u, const Vector& velocity) {
             Eigen::Matrix3Xd J(3, arm.parameters.dof());
             tip_jacobian_rate(arm.parameters, arm.u(u), arm.u(velocity, "velocity"), J);
             return MatrixXd(J);
@@ -194,7 +187,7 @@ void bind_kinematics(py::class_<Arm>& type) {
 void bind_dynamics(py::class_<Arm>& type) {
   type.def(
           "inertia",
-          [](Arm& arm, ConstVectorRef u) {
+          [](Arm& arm, const Vector& u) {
             MatrixXd B(arm.parameters.dof(), arm.parameters.dof());
             inertia_matrix(arm.parameters, arm.workspace, arm.u(u), B);
             return B;
@@ -202,7 +195,7 @@ void bind_dynamics(py::class_<Arm>& type) {
           py::arg("u"), "B(u), (2n, 2n), kg m^2.")
       .def(
           "dynamics_matrices",
-          [](Arm& arm, ConstVectorRef u, ConstVectorRef velocity) {
+          [](Arm& arm, const Vector& u, const Vector& velocity) {
             const int dof = arm.parameters.dof();
             MatrixXd B(dof, dof), C(dof, dof);
             VectorXd G(dof);
@@ -214,10 +207,10 @@ void bind_dynamics(py::class_<Arm>& type) {
           "B(u) in kg m^2, C(u, u') (Christoffel, B' - 2C is skew) in kg m^2/s, G(u) in N m.")
       .def(
           "gravity",
-          [](Arm& arm, ConstVectorRef u) {
-            VectorXd G(arm.parameters.dof());
-            gravity_moments(arm.parameters, arm.workspace, arm.u(u), G);
-            return G;
+          [](Arm& arm, const Vector& u) {
+            Result G(arm.parameters.dof());
+            gravity_moments(arm.parameters, arm.workspace, arm.u(u), G.vector);
+            return G.array;
           },
           py::arg("u"), "G(u), (2n,), N m.")
       .def("inverse_dynamics", &inverse, py::arg("u"), py::arg("velocity"), py::arg("acceleration"),
@@ -227,28 +220,28 @@ void bind_dynamics(py::class_<Arm>& type) {
            "u'' of (16), (2n,), rad/s^2, for a generalized force A tau_A + J' f in N m.")
       .def(
           "kinetic_energy",
-          [](Arm& arm, ConstVectorRef u, ConstVectorRef velocity) {
+          [](Arm& arm, const Vector& u, const Vector& velocity) {
             return kinetic_energy(arm.parameters, arm.workspace, arm.u(u),
                                   arm.u(velocity, "velocity"));
           },
           py::arg("u"), py::arg("velocity"), "1/2 u'^T B u', J.")
       .def(
           "gravity_potential",
-          [](const Arm& arm, ConstVectorRef u) {
+          [](const Arm& arm, const Vector& u) {
             return gravity_potential(arm.parameters, arm.u(u));
           },
           py::arg("u"), "Potential energy of gravity, J; zero at the world's origin.")
       .def(
           "static_moments",
-          [](Arm& arm, ConstVectorRef u) {
-            VectorXd out(arm.parameters.dof());
-            static_moments(arm.parameters, arm.workspace, arm.u(u), out);
-            return out;
+          [](Arm& arm, const Vector& u) {
+            Result out(arm.parameters.dof());
+            static_moments(arm.parameters, arm.workspace, arm.u(u), out.vector);
+            return out.array;
           },
           py::arg("u"), "K u + G(u), (2n,), N m: the generalized force that holds u at rest.")
       .def(
           "rest_shape",
-          [](const Arm& arm, ConstVectorRef tau) {
+          [](const Arm& arm, const Vector& tau) {
             return rest_shape(arm.parameters, arm.u(tau, "tau_actuation_nm"));
           },
           py::arg("tau_actuation_nm"),
@@ -257,7 +250,7 @@ void bind_dynamics(py::class_<Arm>& type) {
            "A(u), (2n, 2n): generalized force = A tau_A; (15).")
       .def(
           "tip_force",
-          [](const Arm& arm, ConstVectorRef u, const Eigen::Vector3d& force) {
+          [](const Arm& arm, const Vector& u, const Eigen::Vector3d& force) {
             VectorXd out = VectorXd::Zero(arm.parameters.dof());
             add_tip_force(arm.parameters, arm.u(u), force, out);
             return out;
@@ -311,7 +304,7 @@ void bind_model(py::module_& module) {
       py::arg("q"), "u of [phi_1, theta_1, ...], rad.");
   module.def(
       "u_to_polar",
-      [](ConstVectorRef u) {
+      [](const Vector& u) {
         expect(u, u.size() / 2 * 2, "u");
         VectorXd q(u.size());
         u_to_polar(u, q);

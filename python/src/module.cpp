@@ -10,6 +10,18 @@
 
 namespace softarm::python {
 
+Result::Result(Eigen::Index size) : vector(nullptr, size) {
+  static PyObject* const kDouble = py::dtype::of<double>().release().ptr();
+  const auto& numpy = py::detail::npy_api::get();
+  py::ssize_t shape = size;
+  Py_INCREF(kDouble);  // the array takes one
+  array = py::reinterpret_steal<py::object>(numpy.PyArray_NewFromDescr_(
+      numpy.PyArray_Type_, kDouble, 1, &shape, nullptr, nullptr, 0, nullptr));
+  if (!array) throw py::error_already_set();
+  void* const data = py::detail::array_proxy(array.ptr())->data;
+  new (&vector) Eigen::Map<Eigen::VectorXd>(static_cast<double*>(data), size);
+}
+
 ConstVectorRef expect(ConstVectorRef vector, Eigen::Index size, const char* name) {
   if (vector.size() != size) {
     throw std::invalid_argument(
@@ -51,6 +63,26 @@ void translate_config_error(std::exception_ptr pointer) {
 
 }  // namespace
 }  // namespace softarm::python
+
+bool pybind11::detail::type_caster<softarm::python::Vector>::load(handle source, bool convert) {
+  static PyObject* const kDouble = dtype::of<double>().release().ptr();
+  const auto look_at = [this](PyObject* array, ssize_t size) {
+    const void* const data = array_proxy(array)->data;
+    new (&value) softarm::python::Vector(static_cast<const double*>(data), size);
+    return true;
+  };
+  if (npy_api::get().PyArray_Check_(source.ptr())) {
+    const PyArray_Proxy& array = *array_proxy(source.ptr());
+    constexpr int kReadable = npy_api::NPY_ARRAY_ALIGNED_ | npy_api::NPY_ARRAY_C_CONTIGUOUS_;
+    if (array.nd == 1 && array.descr == kDouble && (array.flags & kReadable) == kReadable)
+      return look_at(source.ptr(), array.dimensions[0]);
+  }
+  if (!convert) return false;
+  const auto array = array_t<double, array::c_style | array::forcecast>::ensure(source);
+  if (!array || !(array.ndim() == 1 || (array.ndim() == 2 && array.shape(1) == 1))) return false;
+  converted_ = array;
+  return look_at(array.ptr(), array.size());
+}
 
 PYBIND11_MODULE(_core, module) {
   using namespace softarm;

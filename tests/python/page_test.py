@@ -4,11 +4,13 @@ usage: page_test.py BIN_DIR
 """
 
 import io
+import os
 import pathlib
 import re
 import subprocess
 import sys
 import tempfile
+import time
 import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
@@ -144,6 +146,64 @@ class Pages(unittest.TestCase):
             wait_for(lambda: mode() == "FAULT", "FAULT")
             says("FAULT")
             self.assertEqual(shown.errors, [])
+
+    def test_sliders_fill_the_chambers_of_a_simulated_arm_without_a_daemon(self):
+        skip_without_multicast()
+        config = write_config(self.folder, "one_segment.yaml", own_url())
+        plant = start(self, self.folder, BIN / "softarm-plant", config)
+        experiment = softarm.load_experiment(config)
+        client = softarm.ArmClient(experiment)
+        view = softarm.view.View(experiment, "127.0.0.1", 0)
+        self.addCleanup(view.server.stop)
+        hand = view.add_hand(experiment)
+        pictures = softarm.view.live_pictures(client, hand.step)
+
+        def shown_until(reached, what):
+            end = time.monotonic() + 60.0
+            for picture in pictures:
+                if picture is not None:
+                    view.show(picture)
+                    if reached(picture):
+                        return
+                self.assertLess(time.monotonic(), end, what)
+
+        with browser.Page(f"http://127.0.0.1:{view.server.get_port()}/") as page:
+            shown_until(lambda picture: picture.mode == "NO DAEMON" and hand.folder.visible, "the sliders")
+            page.wait("(document.body?.innerText ?? '').includes('NO DAEMON')")
+            page.wait("(document.body?.innerText ?? '').includes('fill the chambers')")
+            hand.sliders[0].value = 0.2
+            shown_until(lambda picture: picture.pressure_bar.max() == 0.0, "vented as long as nobody fills it")
+            hand.fill.value = True
+            shown_until(lambda picture: abs(picture.pressure_bar[0] - 0.2) < 0.01, "0.2 bar in the first chamber")
+            shown_until(lambda picture: picture.u.size == 2 and np.abs(picture.u).max() > 0.05, "a bent arm")
+            with self.assertRaises(RuntimeError, msg="the command channel is taken"):
+                softarm.ArmClient(experiment).lock_commands()
+            hand.fill.value = False
+            shown_until(lambda picture: picture.pressure_bar.max() < 0.01, "a vented arm")
+            softarm.ArmClient(experiment).lock_commands()
+            self.assertIsNone(plant.poll())
+            self.assertEqual(page.errors, [])
+
+    def test_the_demonstration_in_the_browser(self):
+        demo = subprocess.Popen(
+            [ROOT / "tools/demo", "--view", "--duration", "15", "--out", self.folder / "demo"],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            env={**os.environ, "DISPLAY": "", "WAYLAND_DISPLAY": ""},
+        )
+        self.addCleanup(demo.stdout.close)
+        self.addCleanup(demo.wait, 60)
+        self.addCleanup(demo.terminate)
+        said = []
+        url = next((found[1] for line in demo.stdout if said.append(line) or (found := re.search(r"the arm is at (http://\S+)", line))), None)
+        self.assertIsNotNone(url, "".join(said))
+        with browser.Page(url) as page:
+            page.wait("(document.body?.innerText ?? '').includes('ACTIVE')")
+            self.assertEqual(page.errors, [])
+        rest = demo.stdout.read()
+        self.assertEqual(demo.wait(60), 0, rest)
+        self.assertTrue((self.folder / "demo/report.html").exists(), rest)
 
 
 if __name__ == "__main__":

@@ -35,6 +35,8 @@ NOT_RUN = {
     "tools/test -- -L unit": INSTALLS,
     "tools/test -- -R docs": INSTALLS,
     "tools/build dev": INSTALLS,
+    "tools/install_packages": INSTALLS,
+    "tools/build release softarm softarmd softarm-plant softarm_python": INSTALLS,
     "tools/build release softarm unit_model_tests": INSTALLS,
     "tools/package": INSTALLS,
     "tools/install_packages --fuzz": INSTALLS,
