@@ -165,6 +165,14 @@ void keep_smallest(const LoopMargins& found, LoopMargins& kept) {
   kept.delay_s = std::min(kept.delay_s, found.delay_s);
 }
 
+/// Of a list with a number a chamber, or empty; 0: what is left out.
+double mean_lag_s(const std::vector<double>& lag_s, double left_out_s) {
+  if (lag_s.empty()) return left_out_s;
+  double sum = 0.0;
+  for (const double each_s : lag_s) sum += each_s > 0.0 ? each_s : left_out_s;
+  return sum / static_cast<double>(lag_s.size());
+}
+
 }  // namespace
 
 Experiment on_declared_arm(Experiment e) {
@@ -173,6 +181,14 @@ Experiment on_declared_arm(Experiment e) {
   plant.actuation = e.actuation;
   plant.valves.lag_s = e.control.valve_lag_s;
   plant.valves.dead_time_s = e.control.dead_time_s;
+  const ActuatorInverseSettings& inverse = e.actuator_inverse;
+  if (inverse.lags()) {
+    plant.valves.lag_s = mean_lag_s(inverse.fill_lag_s, e.control.valve_lag_s);
+    plant.valves.vent_lag_s = mean_lag_s(inverse.vent_lag_s, e.control.valve_lag_s);
+  }
+  plant.material.hysteresis = inverse.hysteresis;
+  plant.material.play_bar = inverse.play_bar;
+  plant.material.stiffening_per_bar = inverse.stiffening_per_bar;
   plant.valves.supply_pressure_bar = e.actuation.max_pressure_bar;
   plant.mocap.rate_hz = 1.0 / e.safety.frame_period_s;
   plant.mocap.latency_s = e.safety.frame_latency_s;

@@ -28,6 +28,8 @@ namespace {
 constexpr double kLongestVent_s = 1.0;
 constexpr double kRotationTolerance = 1e-6;
 constexpr double kInPlane_rad = 1e-6;
+/// Work of the inverse in the tick grows with their square.
+constexpr std::size_t kMaxPlays = 16;
 
 std::string in_quotes(const std::string& text) { return "\"" + text + "\""; }
 
@@ -58,6 +60,7 @@ class Checks {
       experiment_.control.law.make(
           {experiment_.arm, experiment_.control, chamber_count(experiment_.actuation)});
     });
+    check_inverse();
     check_reference();
   }
 
@@ -206,6 +209,24 @@ class Checks {
               fmt::format("as many as actuation.chambers ({}) in segment {}", expected, i + 1),
               fmt::format("{}", got));
     }
+  }
+
+  void check_inverse() const {
+    const ActuatorInverseSettings& inverse = experiment_.actuator_inverse;
+    require(inverse.play_bar.size() <= kMaxPlays, "actuation.inverse.play_bar",
+            fmt::format("at most {} half widths", kMaxPlays),
+            fmt::format("{}", inverse.play_bar.size()));
+    const auto springs = inverse.slip_radius_rad.size();
+    require(springs == inverse.slip_stiffness_nm_per_rad.size() && springs <= kMaxPlays,
+            "actuation.inverse.slip_stiffness_nm_per_rad",
+            fmt::format("as many as slip_radius_rad ({}), at most {}", springs, kMaxPlays),
+            fmt::format("{}", inverse.slip_stiffness_nm_per_rad.size()));
+    require(!inverse.learn_hysteresis || experiment_.estimation.observer == ObserverKind::model,
+            "actuation.inverse.learn_hysteresis",
+            "false without estimation.observer: model, which sees what is left over", "true");
+    if (inverse.lags())
+      above("control.valve_lag_s", experiment_.control.valve_lag_s, 0.0, "zero",
+            ", the lag that the inverse of the chambers' lags leaves");
   }
 
   void check_reference() const {

@@ -209,7 +209,7 @@ static void describe(Keys& key, ControllerSettings& it) {
   KEY(disturbance, one_of({"cancel", "model_only", "none"}),
       "what the model observer found: cancel (parameters and disturbance), model_only (parameters; "
       "the arm stays soft), none");
-  KEY(valve_lag_s, from(0, 0.5), "first-order lag inverted on what depends on the reference alone");
+  KEY(valve_lag_s, from(0, 2), "first-order lag inverted on what depends on the reference alone");
   key("delay_s", it.dead_time_s, from(0, 0.5),
       "dead time of valves and tubes, for the check of gains at load time");
   KEY(max_theta_rad, above(0, kTwoPi), "soft limit on theta of reference and arm");
@@ -224,6 +224,25 @@ static void describe(Keys& key, RunSettings& it) {
   KEY(duration_s, above(0, kMany), "of `softarm run` and the demo, where none is asked for");
   KEY(tracking_from_s, from(0, kMany), "after ACTIVE; tracking errors count from here on");
   KEY(log_rate_hz, from(0, 1e4), "rows of log.csv, from which errors are taken; 0: every tick");
+}
+
+static void describe_inverse(Keys& key, ActuatorInverseSettings& it, std::size_t chambers) {
+  it.fill_lag_s.resize(chambers, 0.0);
+  it.vent_lag_s.resize(chambers, 0.0);
+  KEY(fill_lag_s, from(0, 100).one_or_each(),
+      "of every chamber, where its pressure rises; what the inverse leaves is control.valve_lag_s; "
+      "0: that");
+  KEY(vent_lag_s, from(0, 100).one_or_each(), "the same where it falls");
+  KEY(hysteresis, from(0, 0.9),
+      "part of every pressure that acts on the arm through play operators");
+  KEY(play_bar, from(0, 100).list(), "half widths of these operators, in equal shares");
+  KEY(learn_hysteresis,
+      "their weights are learnt from what estimation.observer: model leaves over");
+  KEY(stiffening_per_bar, from(0, 100),
+      "k counts as k (1 + stiffening p), p the sum over the segment's chambers");
+  KEY(slip_radius_rad, from(0, kTwoPi).list(),
+      "bends at which springs beside k slip, as identification has them; none if left out");
+  KEY(slip_stiffness_nm_per_rad, from(0, 1e4).list(), "of these springs");
 }
 
 /// Terms that `softarm identify` writes for arms that lag, stretch and remember.
@@ -313,8 +332,18 @@ void describe(Keys& key, Experiment& it) {
         {"uncertainty", "how far the arm may differ from what is configured, for the check"},
         [&] { describe_uncertainty(key, it); });
   });
-  key.section({"actuation", "chambers and the limits of their valves", kRequired},
-              [&] { describe_actuation(key, it.actuation, kRequired); });
+  key.section({"actuation", "chambers and the limits of their valves", kRequired}, [&] {
+    describe_actuation(key, it.actuation, kRequired);
+    key.when(it.actuation.kind == ActuationKind::chambers, [&] {
+      key.section({"inverse",
+                   "what lies between set points and moments, inverted in the tick; "
+                   "all zero: nothing is, at no cost"},
+                  [&] {
+                    describe_inverse(key, it.actuator_inverse,
+                                     static_cast<std::size_t>(chamber_count(it.actuation)));
+                  });
+    });
+  });
   KEY(estimation, "from motion-capture frames to u");
   key.section({"control", "the controller (17)", kRequired}, [&] { describe(key, it.control); });
   describe_reference(key, it.reference);

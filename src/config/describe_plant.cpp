@@ -44,7 +44,7 @@ static void describe(Keys& key, ValveSettings& it) {
 
 static void describe(Keys& key, MaterialSettings& it) {
   KEY(hysteresis, from(0, 1), "part of every pressure that acts through play operators");
-  KEY(play_bar, from(0, 100), "half widths of these operators, in equal shares");
+  KEY(play_bar, from(0, 100).list(), "half widths of these operators, in equal shares");
   KEY(cubic_per_rad2, from(0, 100), "K u becomes K u (1 + cubic |u|^2)");
   KEY(stiffening_per_bar, from(0, 100),
       "K becomes K (1 + stiffening p), p the sum over the segment's chambers");

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "softarm/actuation/actuator_inverse.hpp"
 #include "softarm/base/time.hpp"
 #include "softarm/estimation/model_observer.hpp"
 #include "softarm/model/actuation_matrix.hpp"
@@ -84,6 +85,11 @@ ControlPipeline::ControlPipeline(const PipelineSettings& settings)
       external_(dynamic_cast<ExternalLawInput*>(law_.get())),
       most_force_nm_(most_force_nm(settings.actuation)),
       allocator_(settings.actuation, settings.arm.extensible),
+      inverse_(settings.actuator_inverse.any()
+                   ? std::make_unique<ActuatorInverse>(
+                         settings.arm, settings.actuation, settings.actuator_inverse,
+                         settings.control.valve_lag_s, 1.0 / settings.rate_hz)
+                   : nullptr),
       elongation_(settings.arm.extensible ? std::make_unique<ElongationReference>(
                                                 settings.arm, settings.actuation, allocator_)
                                           : nullptr),
@@ -98,6 +104,7 @@ ControlPipeline::ControlPipeline(const PipelineSettings& settings)
       previous_bar_(PressureVector::Zero(allocator_.chambers())),
       previous_tau_nm_(SegmentVector::Zero(settings.arm.dof())),
       commanded_tau_nm_(previous_tau_nm_),
+      at_rest_(previous_tau_nm_),
       pressure_at_last_motion_bar_(previous_bar_) {
   if (hold_) reference_.hold_within(*hold_);
   seen_ns_.fill(kNever);
@@ -112,6 +119,8 @@ ControlPipeline::~ControlPipeline() = default;
 
 const TickOutput& ControlPipeline::tick(const TickInput& input) noexcept {
   if (!ticked_) epoch_ns_ = input.now_ns;
+  if (inverse_ && ticked_)
+    inverse_->advance(to_seconds(input.now_ns - previous_ns_), previous_bar_);
   if (input.command_expired || input.paused) forget_command();
   SafetyInput safety;
   validate_and_estimate(input, safety);
@@ -136,6 +145,7 @@ const TickOutput& ControlPipeline::tick(const TickInput& input) noexcept {
     reference_.start(seconds(act_ns), output_.motion.u_rad, at_rest);
     if (elongation_) elongation_->start(seconds(act_ns), output_.motion.u_rad);
     law_->reset();
+    if (inverse_) inverse_->start();
     active_since_ns_ = input.now_ns;
     ++activations_;
   }
@@ -149,10 +159,7 @@ const TickOutput& ControlPipeline::tick(const TickInput& input) noexcept {
   }
   limit(mode);
   if (external_ != nullptr) view_for_law(mode, act_ns);
-  if (observer_) {
-    allocator_.torque(output_.pressure_bar, commanded_tau_nm_);
-    observer_->command(input.now_ns, commanded_tau_nm_);
-  }
+  if (observer_ || inverse_) note_command(input.now_ns);
   pressure_watch_.command(input.now_ns, output_.pressure_bar);
   command_moves_.command(input.now_ns, output_.pressure_bar);
   if (unanswered_since_ns_ == kForever &&
@@ -173,6 +180,7 @@ void ControlPipeline::forget_command() noexcept {
   previous_bar_.setZero();
   output_.pressure_bar.setZero();
   pressure_watch_.reset();
+  if (inverse_) inverse_->reset();
   if (observer_) observer_->vented();
 }
 
@@ -476,7 +484,31 @@ void ControlPipeline::allocate() noexcept {
   if (control_.answer == LawAnswer::force)
     solve_actuation(settings_.arm, output_.motion.u_rad, control_.tau_u_nm,
                     control_.tau_actuation_nm);
-  allocator_.allocate(control_.tau_actuation_nm, allocation_);
+  if (inverse_) {
+    const ActuatorInverse::Motion motion{output_.motion.u_rad, window_.now.u, window_.now.velocity};
+    inverse_->allocate(allocator_, control_.tau_actuation_nm, motion, allocation_);
+  } else {
+    allocator_.allocate(control_.tau_actuation_nm, allocation_);
+  }
+}
+
+/// What the observer takes for the command: of an arm whose actuators are inverted, that of the
+/// linear ones that do the same.
+void ControlPipeline::note_command(std::int64_t now_ns) noexcept {
+  if (inverse_) {
+    const bool follows = safety_.mode() == Mode::active;
+    const ActuatorInverse::Motion motion{output_.motion.u_rad,
+                                         follows ? window_.now.u : output_.motion.u_rad,
+                                         follows ? window_.now.velocity : at_rest_};
+    inverse_->sent(allocator_, output_.pressure_bar, motion, commanded_tau_nm_);
+    if (inverse_->learns() && output_.observer != nullptr)
+      inverse_->learn(allocator_, output_.motion.u_rad,
+                      output_.observer->correction().disturbance_nm,
+                      follows && !output_.saturated && !output_.contact);
+  } else {
+    allocator_.torque(output_.pressure_bar, commanded_tau_nm_);
+  }
+  if (observer_) observer_->command(now_ns, commanded_tau_nm_);
 }
 
 void ControlPipeline::limit(Mode mode) noexcept {

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "softarm/simulation/chamber_hysteresis.hpp"
+#include "softarm/actuation/chamber_hysteresis.hpp"
 #include "softarm/simulation/valves.hpp"
 
 namespace softarm {

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "simulation/integrator.hpp"
+#include "softarm/actuation/chamber_hysteresis.hpp"
 #include "softarm/actuation/input_map.hpp"
-#include "softarm/simulation/chamber_hysteresis.hpp"
 #include "softarm/simulation/plant_system.hpp"
 
 namespace softarm {

@@ -2,6 +2,7 @@
 // config/template.yaml documents every setting.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <optional>
 #include <vector>
@@ -37,6 +38,30 @@ struct ActuationSettings {
   double slew_bar_per_s = 40.0;
   double vent_bar_per_s = 8.0;
   std::optional<double> plane_rad;
+};
+
+/// What lies between set points and moments as identification found it, for its inverse in the tick.
+/// All zero: no inverse, at no cost.
+struct ActuatorInverseSettings {
+  /// Of every chamber, where its pressure rises and falls; empty or 0: control.valve_lag_s.
+  std::vector<double> fill_lag_s, vent_lag_s;
+  double hysteresis = 0.0;                           ///< as ChamberHysteresis: h
+  std::vector<double> play_bar = {0.02, 0.05, 0.1};  ///< and its half widths
+  /// The weights of these operators are learnt from what the model-based observer leaves over.
+  bool learn_hysteresis = false;
+  double stiffening_per_bar = 0.0;  ///< k is k (1 + s sum p), p of the segment's chambers
+  /// Springs beside K that slip at a bend, as SlipSpring; of every segment.
+  std::vector<double> slip_radius_rad, slip_stiffness_nm_per_rad;
+
+  bool lags() const {
+    const auto positive = [](double lag_s) { return lag_s > 0.0; };
+    return std::any_of(fill_lag_s.begin(), fill_lag_s.end(), positive) ||
+           std::any_of(vent_lag_s.begin(), vent_lag_s.end(), positive);
+  }
+  bool any() const {
+    return lags() || hysteresis > 0.0 || learn_hysteresis || stiffening_per_bar > 0.0 ||
+           !slip_radius_rad.empty();
+  }
 };
 
 /// Number of chambers, or moments, of the whole arm.

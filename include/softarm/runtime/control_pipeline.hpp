@@ -30,6 +30,7 @@
 
 namespace softarm {
 
+class ActuatorInverse;
 class ElongationReference;
 class ModelObserver;
 
@@ -178,6 +179,7 @@ class ControlPipeline {
   void note_reference(LiveVerdict verdict) noexcept;
   void control(std::int64_t act_ns) noexcept;
   void allocate() noexcept;
+  void note_command(std::int64_t now_ns) noexcept;
   void limit(Mode mode) noexcept;
   bool poses_frozen(std::int64_t now_ns) const noexcept;
   bool beyond_soft_limit(bool speed_too) const noexcept;
@@ -206,6 +208,7 @@ class ControlPipeline {
   ExternalLawInput* external_;   ///< the same law, where it is external
   SegmentVector most_force_nm_;  ///< of an external law: more is no force of this arm
   PressureAllocator allocator_;
+  std::unique_ptr<ActuatorInverse> inverse_;         ///< where it is configured
   std::unique_ptr<ElongationReference> elongation_;  ///< where segments stretch
   PressureRamps ramps_;
   PressureWatch pressure_watch_;
@@ -228,6 +231,7 @@ class ControlPipeline {
   PressureVector previous_bar_;
   SegmentVector previous_tau_nm_;                ///< that these give
   SegmentVector commanded_tau_nm_;               ///< scratch of what is sent now
+  SegmentVector at_rest_;                        ///< zero
   PressureVector pressure_at_last_motion_bar_;   ///< commanded when the poses last changed
   std::int64_t unanswered_since_ns_ = kForever;  ///< when the command moved away from it
   std::array<std::int64_t, kMaxSegments> seen_ns_{};

@@ -70,6 +70,7 @@ struct PipelineSettings {
   ControllerSettings control;
   ReferenceSettings reference;
   ActuationSettings actuation;
+  ActuatorInverseSettings actuator_inverse;
   SafetySettings safety;
   double rate_hz = 500.0;  ///< of the tick
 };

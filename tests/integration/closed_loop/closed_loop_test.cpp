@@ -326,5 +326,36 @@ TEST(ClosedLoop, WithExplicitArmingItIsArmedOnce) {
   EXPECT_TRUE(waits_for_arm);
 }
 
+/// The arm of the recordings: what the observer alone leaves, and what is left with the inverse of its
+/// actuators, as it is and with every number of it wrong by 15 to 30 %.
+TEST(RealArm, TheInverseOfItsActuatorsHalvesTheError) {
+  const auto error_mrad = [](const Experiment& experiment) {
+    const Tracking tracking = track(experiment, 32.0, 10.0);
+    EXPECT_GT(tracking.active_s, 29.0);
+    return 1e3 * tracking.rms_rad;
+  };
+  const double observer_alone = error_mrad(configured("real_arm.yaml"));
+  Experiment inverted = configured("real_arm_inverse.yaml");
+  EXPECT_LT(error_mrad(inverted), 0.5 * observer_alone);
+  for (double& lag_s : inverted.actuator_inverse.fill_lag_s) lag_s *= 1.25;
+  for (double& lag_s : inverted.actuator_inverse.vent_lag_s) lag_s *= 0.85;
+  inverted.actuator_inverse.hysteresis *= 0.7;
+  inverted.actuator_inverse.stiffening_per_bar *= 0.7;
+  EXPECT_LT(error_mrad(inverted), 0.5 * observer_alone);
+}
+
+/// The same ticks, the same bits: nothing but the inputs decides what the inverse asks for.
+TEST(RealArm, TheInverseIsDeterministic) {
+  Experiment inverted = configured("real_arm_inverse.yaml");
+  inverted.actuator_inverse.learn_hysteresis = true;
+  LockStep one(inverted, inverted.plant), other(inverted, inverted.plant);
+  LogRow row, again;
+  for (int k = 0; k < 3000; ++k) {
+    one.step(row, false);
+    other.step(again, false);
+    ASSERT_EQ(one.pipeline().output().pressure_bar, other.pipeline().output().pressure_bar) << k;
+  }
+}
+
 }  // namespace
 }  // namespace softarm

@@ -46,7 +46,7 @@ const Slip kRefused[] = {
     {"estimation: {max_speed_radps: 5000}\n", "", "estimation.max_speed_radps", "200] rad/s"},
     {"estimation: {position_noise_m: 0.2}\n", "", "estimation.position_noise_m", "0.02] m"},
     {"control: {max_speed_radps: 1000}\n", "", "control.max_speed_radps", "100] rad/s"},
-    {"control: {valve_lag_s: 5}\n", "", "control.valve_lag_s", "[0, 0.5] s"},
+    {"control: {valve_lag_s: 5}\n", "", "control.valve_lag_s", "[0, 2] s"},
     {"control: {delay_s: 5}\n", "", "control.delay_s", "[0, 0.5] s"},
     // An unstable loop swings at one to two Hz, whatever its reference does.
     {"", "safety: {oscillation_lowest_hz: 1000}", "daemon.safety.oscillation_lowest_hz",

@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <set>
+#include <tuple>
 #include <vector>
 
 #include "counted_malloc.hpp"
@@ -18,9 +19,17 @@ TEST(PipelineAllocation, TenThousandTicksThroughAllModes) {
   experiment.reference.phases.insert(experiment.reference.phases.begin(),
                                      {LiveReference{.timeout_s = 0.2}, 1.0});
   using enum ControlCoordinates;
-  for (const auto& [coordinates, observer] : {std::pair(u, ObserverKind::kinematic),
-                                              {polar, ObserverKind::kinematic},
-                                              {u, ObserverKind::model}}) {
+  ActuatorInverseSettings everything{.hysteresis = 0.1, .learn_hysteresis = true};
+  everything.fill_lag_s.assign(12, 0.04);
+  everything.vent_lag_s.assign(12, 0.06);
+  everything.stiffening_per_bar = 0.02;
+  everything.slip_radius_rad = everything.slip_stiffness_nm_per_rad = {0.01, 0.05};
+  for (const auto& [coordinates, observer, inverse] :
+       {std::tuple(u, ObserverKind::kinematic, ActuatorInverseSettings{}),
+        {polar, ObserverKind::kinematic, ActuatorInverseSettings{}},
+        {u, ObserverKind::model, ActuatorInverseSettings{}},
+        {u, ObserverKind::model, everything}}) {
+    experiment.actuator_inverse = inverse;
     experiment.control.coordinates = coordinates;
     experiment.estimation.observer = observer;
     const auto bench = std::make_unique<PipelineBench>(experiment);

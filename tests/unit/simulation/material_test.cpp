@@ -6,8 +6,8 @@
 #include <stdexcept>
 #include <vector>
 
+#include "softarm/actuation/chamber_hysteresis.hpp"
 #include "softarm/simulation/arm_plant.hpp"
-#include "softarm/simulation/chamber_hysteresis.hpp"
 #include "unit/simulation/paper_arm.hpp"
 
 namespace softarm {
