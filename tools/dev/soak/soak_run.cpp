@@ -200,9 +200,11 @@ bool SoakRun::answered(const SoakFault& fault, std::int64_t counter_before) {
   if (fault.of_valves())
     return arm_.wait_for(
         [&] {
-          return arm_.left_active() &&
-                 (terminal_vented() || fault.action == SoakAction::stick_valves) &&
-                 (fault.valves == ValveReason::none || arm_.saw(fault.valves));
+          // Where the driver vents for another reason first, stuck valves are pressures that stay.
+          const bool stuck = fault.action == SoakAction::stick_valves;
+          const bool named = fault.valves == ValveReason::none || arm_.saw(fault.valves) ||
+                             (stuck && arm_.saw(ValveReason::zero_unconfirmed));
+          return arm_.left_active() && (terminal_vented() || stuck) && named;
         },
         kPatience_s);
   if (fault.mode == Mode::active)  // a daemon that is no more
