@@ -7,6 +7,7 @@
 #include <concepts>
 
 #include "model/entire_series.hpp"
+#include "model/quad.hpp"
 
 namespace softarm {
 
@@ -108,7 +109,7 @@ struct LaneTangents {
 
 /// Two or three tangents in one register: along u_x, u_y and, where segments stretch, e.
 using BendingDual = Dual<double, Pair>;
-using StretchDual = Dual<double, Lanes>;
+using StretchDual = Dual<double, Quad>;
 using BendingLanes = Dual<Lanes, LaneTangents<2>>;
 using StretchLanes = Dual<Lanes, LaneTangents<3>>;
 
@@ -118,7 +119,7 @@ inline BendingDual at(const BendingLanes& a, int l) noexcept {
   return {a.v[l], Pair{a.d.along[0][l], a.d.along[1][l]}};
 }
 inline StretchDual at(const StretchLanes& a, int l) noexcept {
-  return {a.v[l], Lanes{a.d.along[0][l], a.d.along[1][l], a.d.along[2][l], 0.0}};
+  return {a.v[l], Quad{a.d.along[0][l], a.d.along[1][l], a.d.along[2][l], 0.0}};
 }
 
 /// c_0 ... c_{N-1} by dc_k/ds = (k c_{k+2} - c_{k+1}) / 2. With N = 12 the tangents of the last two

@@ -7,6 +7,7 @@
 
 #include <type_traits>
 
+#include "model/quad.hpp"
 #include "model/segment_geometry.hpp"
 
 namespace softarm {
@@ -14,7 +15,7 @@ namespace softarm {
 /// Columns of one segment side by side: along u_x and u_y, and where segments stretch along e, with
 /// a zero to fill the register.
 template <bool kExtensible>
-using Columns = std::conditional_t<kExtensible, Lanes, Pair>;
+using Columns = std::conditional_t<kExtensible, Quad, Pair>;
 template <bool kExtensible>
 inline constexpr int kCoordinates = kExtensible ? 3 : 2;
 
@@ -43,8 +44,8 @@ struct PointMotion {
 };
 
 /// Along u_x, u_y and e.
-inline Lanes beside(const Pair& u, double e) noexcept { return Lanes{u[0], u[1], e, 0.0}; }
-inline Vec3<Lanes> beside(const PairVector3& u, const Vector3& e) noexcept {
+inline Quad beside(const Pair& u, double e) noexcept { return Quad{u[0], u[1], e, 0.0}; }
+inline Vec3<Quad> beside(const PairVector3& u, const Vector3& e) noexcept {
   return {beside(u.x, e.x), beside(u.y, e.y), beside(u.z, e.z)};
 }
 

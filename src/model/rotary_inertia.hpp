@@ -57,7 +57,7 @@ inline BendingDual sum(const BendingLanes& a) noexcept {
   return {sum(a.v), Pair{sum(a.d.along[0]), sum(a.d.along[1])}};
 }
 inline StretchDual sum(const StretchLanes& a) noexcept {
-  return {sum(a.v), Lanes{sum(a.d.along[0]), sum(a.d.along[1]), sum(a.d.along[2]), 0.0}};
+  return {sum(a.v), Quad{sum(a.d.along[0]), sum(a.d.along[1]), sum(a.d.along[2]), 0.0}};
 }
 
 /// One number for all nodes.

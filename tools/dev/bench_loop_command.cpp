@@ -50,6 +50,7 @@ void add_bench_loop_command(CLI::App& group) {
   command->add_option("--cpu", options->cpu, "pin softarmd and its rivals to it; -1: not pinned")
       ->check(CLI::Range(-1, 1023))
       ->capture_default_str();
+  command->add_flag("--law", options->law, "softarmd asks a control law in another process");
   command->callback([options] { bench(*options); });
 }
 

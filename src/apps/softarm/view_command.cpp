@@ -44,7 +44,10 @@ void add_view_command(CLI::App& app) {
   command->add_option("--port", options->port, "port to serve it on, 0: any free one")
       ->check(CLI::Range(0, 65535))
       ->capture_default_str();
-  command->add_flag("--control", options->control, "buttons to arm, disarm and stop a running arm")
+  command
+      ->add_flag("--control", options->control,
+                 "buttons to arm, disarm and stop a running arm; sliders for a "
+                 "simulated one without a daemon")
       ->excludes(log);
   command->callback([options] {
     if (const int code = view(*options); code != kExitOk) throw CLI::RuntimeError(code);

@@ -77,7 +77,7 @@ class Scene {
     const int second_ticks = static_cast<int>(options.rate_hz);  // the longest allowed
     setenv("XDG_STATE_HOME", folder_.c_str(), 1);                // of the daemon
     std::ofstream(folder_ / "loop.yaml") << fmt::format(
-        "include: {}\nname: bench_loop\nreference: [{{kind: set_point, theta_rad: {}}}]\n"
+        "include: {}\nname: bench_loop\nreference: [{{kind: set_point, theta_rad: {}}}]\n{}"
         "daemon:\n  rate_hz: {}\n  capture_time: latency\n"
         "  lcm: {{url: \"udpm://239.255.76.67:{}?ttl=0\"}}\n"
         "  safety: {{arming: automatic, frame_period_s: {}, frame_latency_s: 0, hold_after_s: "
@@ -85,9 +85,10 @@ class Scene {
         "    vent_after_s: 2, hold_overruns: {}, vent_overruns: {}, valve_readback: "
         "false}}\n"
         "  realtime: {{fifo: {}, priority: {}, cpu: {}}}\n",
-        std::filesystem::absolute(options.config).string(), kTheta_rad, options.rate_hz,
-        20000 + getpid() % 12000, 1.0 / options.rate_hz, second_ticks - 1, second_ticks,
-        result.fifo, kPriority, options.cpu < 0 ? "any" : std::to_string(options.cpu));
+        std::filesystem::absolute(options.config).string(), kTheta_rad,
+        options.law ? "control: {law: external}\n" : "", options.rate_hz, 20000 + getpid() % 12000,
+        1.0 / options.rate_hz, second_ticks - 1, second_ticks, result.fifo, kPriority,
+        options.cpu < 0 ? "any" : std::to_string(options.cpu));
     experiment_ = load_experiment(folder_ / "loop.yaml");
     if (experiment_.transport.mocap.source != softarm_mocap())
       throw ConfigError(options.config, 0, "daemon.mocap.source",
@@ -115,7 +116,7 @@ class Scene {
   bool wait_for(const std::function<bool()>& reached);
   /// What happened in between: numbers of frames, of requests, of ticks, of bare wake-ups.
   struct Window {
-    std::size_t frame = 0, request = 0, bare = 0;
+    std::size_t frame = 0, request = 0, bare = 0, law = 0;
     std::int64_t tick = 0, missed = 0, bare_missed = 0;
     double stolen_s = 0.0;
   };
@@ -136,6 +137,7 @@ class Scene {
   std::vector<std::int64_t> sent_ns_{0}, echo_sent_ns_{0}, echoed_ns_{0};
   std::map<std::int64_t, std::int64_t> commanded_ns_;
   std::map<std::int64_t, Tick> ticks_;
+  std::vector<double> law_us_;  ///< of every tick, the newest
   std::int64_t first_ns_ = 0, echoes_ = 0;
   softarm_messages::controller_status_t status_{};
   softarm_messages::tick_record_t record_{};
@@ -182,7 +184,9 @@ void Scene::listen() {
     command_bytes_ = static_cast<int>(packet.bytes.size());
   });
   node_->subscribe(lcm.status_channel, 256, [this](const ReceivedMessage& packet) {
-    if (decode(packet.bytes, status_)) ticks_[status_.tick].overruns_before = status_.overruns;
+    if (!decode(packet.bytes, status_)) return;
+    ticks_[status_.tick].overruns_before = status_.overruns;
+    if (std::isfinite(status_.law_round_trip_s)) law_us_.push_back(1e6 * status_.law_round_trip_s);
   });
   node_->subscribe(lcm.tick_channel, 256, [this](const ReceivedMessage& packet) {
     if (!decode(packet.bytes, record_)) return;
@@ -231,6 +235,7 @@ Scene::Window Scene::window(const SharedWakeUps& wake_ups) const {
   return {.frame = sent_ns_.size(),
           .request = echo_sent_ns_.size(),
           .bare = wake_ups.count(),
+          .law = law_us_.size(),
           .tick = status_.tick,
           .missed = status_.overruns,
           .bare_missed = wake_ups.missed(),
@@ -281,6 +286,8 @@ void Scene::evaluate(const Window& from, const Window& to, const SharedWakeUps& 
       echo_us.push_back(1e-3 * static_cast<double>(echoed_ns_[k] - echo_sent_ns_[k]));
   for (std::size_t k = from.bare; k < to.bare; ++k)
     bare_us.push_back(1e-3 * static_cast<double>(wake_ups.lateness_ns(k)));
+  result_.law = durations({law_us_.begin() + static_cast<std::ptrdiff_t>(from.law),
+                           law_us_.begin() + static_cast<std::ptrdiff_t>(to.law)});
   result_.echo = durations(echo_us);
   result_.bare_lateness = durations(bare_us);
   result_.missed = to.missed - from.missed;
@@ -300,6 +307,9 @@ void Scene::run(const std::function<void(const std::string&)>& progress) {
   const ForkedPeer echo([&] {
     echo_forever(experiment_.transport.lcm.url, chamber_count(experiment_.actuation), realtime);
   });
+  std::unique_ptr<ForkedPeer> law;
+  if (options_.law)
+    law = std::make_unique<ForkedPeer>([&] { answer_states_forever(experiment_, realtime); });
   ChildProcess daemon(program_beside_this("softarmd"), {(folder_ / "loop.yaml").string()},
                       (folder_ / "softarmd.txt").string());
   std::vector<std::unique_ptr<ForkedPeer>> load;

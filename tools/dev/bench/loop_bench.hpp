@@ -21,6 +21,7 @@ struct LoopBenchOptions {
   double rate_hz = 1000.0;
   int busy_processes = 3;  ///< of the loaded scene
   int cpu = -1;            ///< on which daemon, echo and sleeper run; -1: any
+  bool law = false;        ///< a control law in another process
 };
 
 struct Durations {
@@ -38,6 +39,7 @@ struct LoopScene {
   Durations command{};                       ///< the daemon's, without the wait
   Durations wait{};                          ///< until the tick was due
   Durations whole{};                         ///< the daemon's round trip, the wait included
+  Durations law{};                           ///< from a state to the arrival of the law's answer
   Durations bare_lateness{}, lateness{};     ///< of wake-ups after their deadline
   std::int64_t bare_missed = 0, missed = 0;  ///< deadlines
   std::int64_t missed_asleep = 0;  ///< of the daemon's: before it woke, as all of the bare sleep's

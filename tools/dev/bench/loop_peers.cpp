@@ -15,6 +15,7 @@
 
 #include "softarm/base/clock.hpp"
 #include "softarm/base/realtime.hpp"
+#include "softarm/client/arm_client.hpp"
 #include "softarm/transport/lcm_node.hpp"
 
 namespace softarm {
@@ -60,6 +61,16 @@ void echo_forever(const std::string& url, int chambers, const RealtimeSettings& 
   });
   apply_realtime_settings(realtime);
   while (true) node.wait_until(monotonic_now_ns() + 1'000'000'000);
+}
+
+void answer_states_forever(const Experiment& experiment, const RealtimeSettings& realtime) {
+  RealtimeSettings below = realtime;
+  below.priority = std::max(1, realtime.priority - 1);
+  apply_realtime_settings(below);
+  ArmClient client(experiment);
+  const Eigen::VectorXd zero = Eigen::VectorXd::Zero(experiment.arm.dof());
+  client.on_law_request([&](const LawRequest& request) { client.answer_force(request, zero); });
+  while (true) client.update(monotonic_now_ns() + 1'000'000'000);
 }
 
 SharedWakeUps::SharedWakeUps(std::size_t capacity)

@@ -9,6 +9,7 @@
 #include <string>
 
 #include "softarm/base/realtime.hpp"
+#include "softarm/config/experiment.hpp"
 
 namespace softarm {
 
@@ -34,6 +35,11 @@ inline constexpr const char* kEchoAnswer = "SOFTARM_BENCH_COMMAND";
 /// Scheduled as the daemon is: LCM's thread one priority below the one that answers. Never returns.
 [[noreturn]] void echo_forever(const std::string& url, int chambers,
                                const RealtimeSettings& realtime);
+
+/// Answers every state of an experiment's external law with zero moments, scheduled likewise. Never
+/// returns.
+[[noreturn]] void answer_states_forever(const Experiment& experiment,
+                                        const RealtimeSettings& realtime);
 
 /// Wake-ups of a bare clock_nanosleep at a fixed rate, in memory that two processes share.
 class SharedWakeUps {

@@ -27,6 +27,7 @@ Json json_of(const LoopScene& scene) {
                {"command", json_of(scene.command)},
                {"wait", json_of(scene.wait)},
                {"whole", json_of(scene.whole)},
+               {"law", json_of(scene.law)},
                {"bare_lateness", json_of(scene.bare_lateness)},
                {"lateness", json_of(scene.lateness)},
                {"round_trip_p50_ratio", scene.round_trip_p50_ratio()},
@@ -55,6 +56,7 @@ std::string table(const LoopScene& scene, double period_ms) {
   text += row("round trip, frame to command without the wait", scene.command);
   text += row("  the wait until the tick is due", scene.wait);
   text += row("  with the wait", scene.whole);
+  if (scene.law.count > 0) text += row("state to the answer of a law in a process", scene.law);
   text += row("lateness, bare clock_nanosleep", scene.bare_lateness);
   text += row("lateness, softarmd's tick", scene.lateness);
   text += fmt::format(
