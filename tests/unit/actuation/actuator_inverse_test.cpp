@@ -24,8 +24,7 @@ ArmParameters one_segment_arm() {
 ActuationSettings four_chambers() {
   ActuationSettings actuation;
   actuation.segments.resize(1);
-  for (int j = 0; j < 4; ++j)
-    actuation.segments[0].push_back({0.5 * std::numbers::pi * j, 0.3});
+  for (int j = 0; j < 4; ++j) actuation.segments[0].push_back({0.5 * std::numbers::pi * j, 0.3});
   actuation.min_pressure_bar = -1e3;  // no limit gets in the way
   actuation.max_pressure_bar = 1e3;
   return actuation;
@@ -183,8 +182,7 @@ TEST(ActuatorInverse, HoldsAgainstStiffeningAndSlip) {
   allocator.generalized_force(allocation.pressures_bar, force);
   const double size = motion.u.norm();
   const double slip = 0.4 * 0.05 / size + 0.2;  // the first has slipped, the second has not
-  const Eigen::Vector2d held =
-      (1.0 + 0.3 * allocation.pressures_bar.sum() + slip) * motion.u;
+  const Eigen::Vector2d held = (1.0 + 0.3 * allocation.pressures_bar.sum() + slip) * motion.u;
   EXPECT_LE((force - held).norm(), 5e-4 * held.norm());
   inverse.sent(allocator, allocation.pressures_bar, motion, effective);
   EXPECT_LE((effective - tau).norm(), 1e-3 * tau.norm());
@@ -245,7 +243,7 @@ TEST(ActuatorInverse, RefusesWhatHasNoInverse) {
   settings.fill_lag_s = {0.1};
   EXPECT_THROW(make(settings, kTarget_s), std::invalid_argument) << "one for four chambers";
   settings = {};
-  settings.slip_radius_rad = {0.1};
+  settings.slip_radius_rad = {0.1, 0.2};
   EXPECT_THROW(make(settings, kTarget_s), std::invalid_argument);
 }
 
