@@ -19,7 +19,7 @@ constexpr double kForget_s = 10.0;
 /// Time in which weights follow what they should be, where they are excited.
 constexpr double kLearning_s = 10.0;
 constexpr double kMostLearnt = 0.6;
-/// Slack of less than this part of the chambers' largest force says nothing.
+/// Slack of less than this part of the chambers' largest force shows nothing.
 constexpr double kLeastSlack = 1e-3;
 
 double approach(double period_s, double lag_s) {
