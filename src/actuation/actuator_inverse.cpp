@@ -201,7 +201,7 @@ void ActuatorInverse::effective_torque(const PressureAllocator& allocator,
 
 void ActuatorInverse::learn(const PressureAllocator& allocator, ConstVectorRef u_rad,
                             ConstVectorRef disturbance_nm, bool may) noexcept {
-  if (!may) return;
+  if (!may || !disturbance_nm.allFinite()) return;
   learning_s_ += period_s_;
   const double forget = period_s_ / std::min(learning_s_, kForget_s);
   mean_disturbance_nm_ += forget * (disturbance_nm - mean_disturbance_nm_);
@@ -222,7 +222,7 @@ void ActuatorInverse::learn(const PressureAllocator& allocator, ConstVectorRef u
   for (Eigen::Index k = 0; k < next_weight_.size(); ++k) {
     const double along = slack_nm_.col(k).dot(disturbance_nm - mean_disturbance_nm_);
     const double moved = next_weight_[k] + rate * along;
-    if (moved == moved) next_weight_[k] = std::clamp(moved, 0.0, kMostLearnt);
+    next_weight_[k] = std::clamp(moved, 0.0, kMostLearnt);
     sum += next_weight_[k];
   }
   if (sum > kMostLearnt) next_weight_ *= kMostLearnt / sum;
