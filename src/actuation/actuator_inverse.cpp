@@ -19,7 +19,7 @@ constexpr double kForget_s = 10.0;
 /// Time in which weights follow what they should be, where they are excited.
 constexpr double kLearning_s = 10.0;
 constexpr double kMostLearnt = 0.6;
-/// Slack of less than this part of the chambers' largest force says nothing.
+/// Slack of less than this part of the chambers' largest force shows nothing.
 constexpr double kLeastSlack = 1e-3;
 
 double approach(double period_s, double lag_s) {
@@ -68,7 +68,7 @@ ActuatorInverse::ActuatorInverse(const ArmParameters& arm, const ActuationSettin
       min_bar_(actuation.min_pressure_bar),
       max_bar_(actuation.max_pressure_bar),
       stiffening_per_bar_(settings.stiffening_per_bar),
-      changes_torque_(settings.stiffening_per_bar > 0.0 || !settings.slip_radius_rad.empty()),
+      changes_torque_(settings.stiffening_per_bar > 0.0 || settings.slips()),
       learns_(settings.learn_hysteresis && !settings.play_bar.empty()),
       period_s_(period_s),
       target_lag_s_(valve_lag_s),
@@ -82,7 +82,7 @@ ActuatorInverse::ActuatorInverse(const ArmParameters& arm, const ActuationSettin
       effective_nm_(tau_nm_),
       material_nm_(tau_nm_) {
   check(actuation, settings, valve_lag_s);
-  for (std::size_t k = 0; k < settings.slip_radius_rad.size(); ++k)
+  for (std::size_t k = 0; settings.slips() && k < settings.slip_radius_rad.size(); ++k)
     spring_.push_back({settings.slip_radius_rad[k], settings.slip_stiffness_nm_per_rad[k]});
   centre_.setZero(2, static_cast<Eigen::Index>(spring_.size()) * arm.size());
   if (learns_) {
@@ -117,8 +117,8 @@ void ActuatorInverse::reset() noexcept {
 
 void ActuatorInverse::advance(double passed_s, const PressureVector& set_point_bar) noexcept {
   for (Eigen::Index j = 0; j < pressure_bar_.size(); ++j)
-    pressure_bar_[j] = lag_[static_cast<std::size_t>(j)].step(pressure_bar_[j], set_point_bar[j],
-                                                              passed_s);
+    pressure_bar_[j] =
+        lag_[static_cast<std::size_t>(j)].step(pressure_bar_[j], set_point_bar[j], passed_s);
   acting_bar_ = pressure_bar_;
   if (!hysteresis_.active()) return;
   hysteresis_.remember(pressure_bar_);
@@ -138,9 +138,8 @@ void ActuatorInverse::take_material(const Motion& motion, const PressureVector& 
     const Eigen::Index count = chambers_[static_cast<std::size_t>(i)];
     const double s =
         stiffening_per_bar_ * arm_.segments[static_cast<std::size_t>(i)].stiffness_nm_per_rad;
-    Eigen::Vector2d force =
-        s * (asked_bar.segment(first, count).sum() * u +
-             target_lag_s_ * pressure_bar_.segment(first, count).sum() * rate);
+    Eigen::Vector2d force = s * (asked_bar.segment(first, count).sum() * u +
+                                 target_lag_s_ * pressure_bar_.segment(first, count).sum() * rate);
     for (const SlipSpring& spring : spring_) {
       const Eigen::Vector2d from = centre_.col(centre++);
       force += spring.moment(from, u) + target_lag_s_ * (spring.slope(from, u) * rate);
@@ -202,7 +201,7 @@ void ActuatorInverse::effective_torque(const PressureAllocator& allocator,
 
 void ActuatorInverse::learn(const PressureAllocator& allocator, ConstVectorRef u_rad,
                             ConstVectorRef disturbance_nm, bool may) noexcept {
-  if (!may) return;
+  if (!may || !disturbance_nm.allFinite()) return;
   learning_s_ += period_s_;
   const double forget = period_s_ / std::min(learning_s_, kForget_s);
   mean_disturbance_nm_ += forget * (disturbance_nm - mean_disturbance_nm_);
@@ -223,7 +222,7 @@ void ActuatorInverse::learn(const PressureAllocator& allocator, ConstVectorRef u
   for (Eigen::Index k = 0; k < next_weight_.size(); ++k) {
     const double along = slack_nm_.col(k).dot(disturbance_nm - mean_disturbance_nm_);
     const double moved = next_weight_[k] + rate * along;
-    if (moved == moved) next_weight_[k] = std::clamp(moved, 0.0, kMostLearnt);
+    next_weight_[k] = std::clamp(moved, 0.0, kMostLearnt);
     sum += next_weight_[k];
   }
   if (sum > kMostLearnt) next_weight_ *= kMostLearnt / sum;

@@ -241,7 +241,7 @@ static void describe_inverse(Keys& key, ActuatorInverseSettings& it, std::size_t
   KEY(stiffening_per_bar, from(0, 100),
       "k counts as k (1 + stiffening p), p the sum over the segment's chambers");
   KEY(slip_radius_rad, from(0, kTwoPi).list(),
-      "bends at which springs beside k slip, as identification has them; none if left out");
+      "bends at which springs beside k slip, as identification has them");
   KEY(slip_stiffness_nm_per_rad, from(0, 1e4).list(), "of these springs");
 }
 

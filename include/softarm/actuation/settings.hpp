@@ -50,17 +50,18 @@ struct ActuatorInverseSettings {
   /// The weights of these operators are learnt from what the model-based observer leaves over.
   bool learn_hysteresis = false;
   double stiffening_per_bar = 0.0;  ///< k is k (1 + s sum p), p of the segment's chambers
-  /// Springs beside K that slip at a bend, as SlipSpring; of every segment.
-  std::vector<double> slip_radius_rad, slip_stiffness_nm_per_rad;
+  /// Springs beside K that slip at a bend, as SlipSpring; of every segment. Without stiffness: none.
+  std::vector<double> slip_radius_rad = {0.0}, slip_stiffness_nm_per_rad = {0.0};
 
-  bool lags() const {
-    const auto positive = [](double lag_s) { return lag_s > 0.0; };
-    return std::any_of(fill_lag_s.begin(), fill_lag_s.end(), positive) ||
-           std::any_of(vent_lag_s.begin(), vent_lag_s.end(), positive);
-  }
+  bool lags() const { return positive(fill_lag_s) || positive(vent_lag_s); }
+  bool slips() const { return positive(slip_stiffness_nm_per_rad); }
   bool any() const {
-    return lags() || hysteresis > 0.0 || learn_hysteresis || stiffening_per_bar > 0.0 ||
-           !slip_radius_rad.empty();
+    return lags() || hysteresis > 0.0 || learn_hysteresis || stiffening_per_bar > 0.0 || slips();
+  }
+
+ private:
+  static bool positive(const std::vector<double>& values) {
+    return std::any_of(values.begin(), values.end(), [](double value) { return value > 0.0; });
   }
 };
 

@@ -24,8 +24,7 @@ ArmParameters one_segment_arm() {
 ActuationSettings four_chambers() {
   ActuationSettings actuation;
   actuation.segments.resize(1);
-  for (int j = 0; j < 4; ++j)
-    actuation.segments[0].push_back({0.5 * std::numbers::pi * j, 0.3});
+  for (int j = 0; j < 4; ++j) actuation.segments[0].push_back({0.5 * std::numbers::pi * j, 0.3});
   actuation.min_pressure_bar = -1e3;  // no limit gets in the way
   actuation.max_pressure_bar = 1e3;
   return actuation;
@@ -183,16 +182,19 @@ TEST(ActuatorInverse, HoldsAgainstStiffeningAndSlip) {
   allocator.generalized_force(allocation.pressures_bar, force);
   const double size = motion.u.norm();
   const double slip = 0.4 * 0.05 / size + 0.2;  // the first has slipped, the second has not
-  const Eigen::Vector2d held =
-      (1.0 + 0.3 * allocation.pressures_bar.sum() + slip) * motion.u;
-  EXPECT_LE((force - held).norm(), 5e-4 * held.norm());
+  const Eigen::Vector2d held = (1.0 + 0.3 * allocation.pressures_bar.sum() + slip) * motion.u;
+  // Stiffening times bend over gain is 1/4: three corrections leave 1/64 of what is to be added.
+  const double rest = (held - motion.u).norm() / 64.0;
+  EXPECT_LE((force - held).norm(), rest);
   inverse.sent(allocator, allocation.pressures_bar, motion, effective);
-  EXPECT_LE((effective - tau).norm(), 1e-3 * tau.norm());
+  EXPECT_LE((effective - tau).norm(), rest);
 }
 
 /// Weights follow the disturbance that their error makes, and stay where they are without it.
 TEST(ActuatorInverse, LearnsTheWeightsThatTheDisturbanceShows) {
-  const ActuationSettings actuation = four_chambers();
+  ActuationSettings actuation = four_chambers();
+  actuation.min_pressure_bar = -2.0;
+  actuation.max_pressure_bar = 2.0;
   const PressureAllocator allocator(actuation);
   ActuatorInverseSettings settings;
   settings.play_bar = {0.02, 0.1};
@@ -203,6 +205,7 @@ TEST(ActuatorInverse, LearnsTheWeightsThatTheDisturbanceShows) {
   Motion motion;
   Allocation allocation;
   SegmentVector tau(2), effective(2), disturbance(2);
+  double before_nm = 0.0, after_nm = 0.0;  // largest unexplained force
   for (int k = 0; k < 30000; ++k) {
     const double t_s = k * kPeriod_s;
     tau << 0.2 * std::sin(2.0 * t_s), 0.1 * std::cos(3.0 * t_s);
@@ -217,10 +220,12 @@ TEST(ActuatorInverse, LearnsTheWeightsThatTheDisturbanceShows) {
     model.set_weights(inverse.weights());
     model.apply(known);
     allocator.generalized_force(acts - known, disturbance);
+    if (t_s < 9.0) before_nm = std::max(before_nm, disturbance.norm());
+    if (t_s > 50.0) after_nm = std::max(after_nm, disturbance.norm());
     disturbance.array() += 0.3;  // what lasts is no hysteresis
     inverse.learn(allocator, motion.u, disturbance, true);
   }
-  EXPECT_NEAR(inverse.weights().sum(), 0.2, 0.02);
+  EXPECT_LT(after_nm, 0.5 * before_nm);
   const Eigen::VectorXd found = inverse.weights();
   inverse.learn(allocator, motion.u, SegmentVector::Constant(2, 1e6), false);
   EXPECT_EQ(inverse.weights(), found);
@@ -245,7 +250,7 @@ TEST(ActuatorInverse, RefusesWhatHasNoInverse) {
   settings.fill_lag_s = {0.1};
   EXPECT_THROW(make(settings, kTarget_s), std::invalid_argument) << "one for four chambers";
   settings = {};
-  settings.slip_radius_rad = {0.1};
+  settings.slip_radius_rad = {0.1, 0.2};
   EXPECT_THROW(make(settings, kTarget_s), std::invalid_argument);
 }
 
