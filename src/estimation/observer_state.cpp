@@ -188,7 +188,7 @@ void ModelObserver::State::find_gravity_slope() noexcept {
 }
 
 /// Information of the last seconds about the parameters of each segment, with the disturbance a
-/// random walk: a constant regressor cannot be told from it, one that moves can.
+/// random walk: a constant regressor cannot be separated from it, one that moves can.
 void ModelObserver::State::note_excitation(double step_s, const KnownMotion* reference) noexcept {
   constexpr double kMemory_s = 2.0;
   const bool known = reference != nullptr;
