@@ -81,6 +81,20 @@ class ErrorCovariance {
     for (int j = parameters(); j < static_cast<int>(P_.cols()); ++j)
       if (P_(j, j) < prior) P_(j, j) += variance;
   }
+  /// Adds a covariance to the parameters of a segment of the group, but for those that are not known
+  /// better than `prior_deviation`.
+  void add_to_parameters(int segment, Eigen::Matrix<double, kParameters, kParameters> covariance,
+                         double prior_deviation) noexcept {
+    const int at = parameters() + kParameters * segment;
+    auto own = P_.template block<kParameters, kParameters>(at, at);
+    const double prior = prior_deviation * prior_deviation;
+    for (int j = 0; j < kParameters; ++j) {
+      if (own(j, j) < prior) continue;
+      covariance.row(j).setZero();
+      covariance.col(j).setZero();
+    }
+    own += covariance;
+  }
   void add_to_disturbance(const Vector& variance) noexcept {
     P_.diagonal().segment(2 * dof_, dof_) += variance;
   }

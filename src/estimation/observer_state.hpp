@@ -34,6 +34,7 @@ struct ModelObserver::State {
   bool advance_base(std::int64_t time_ns, const KnownMotion* reference) noexcept;
   void find_regressors(const KnownMotion* reference) noexcept;
   void find_gravity_slope() noexcept;
+  void note_excitation(double step_s, const KnownMotion* reference) noexcept;
   void measure(const MocapFrame& frame, const CurvatureEstimate& estimate, double since_s) noexcept;
   bool correct(double since_s) noexcept;
   void limit_corrections() noexcept;
@@ -85,8 +86,13 @@ struct ModelObserver::State {
   std::array<bool, kMaxSegments> seen{};
   std::array<int, kMaxSegments> unseen_frames{};
   std::array<BodyNoiseJacobians, kMaxSegments> noise_jacobian;
+  // What the motion has shown of a segment's parameters lately.
+  using Parameters = Eigen::Matrix<double, 5, 5>;
+  std::array<Parameters, kMaxSegments> information;
+  bool regressors_known = false;
   // About the present motion.
-  Eigen::Matrix<double, Eigen::Dynamic, 5, Eigen::ColMajor, 2 * kMaxSegments, 5> regressors;
+  Eigen::Matrix<double, Eigen::Dynamic, 5, Eigen::ColMajor, 2 * kMaxSegments, 5> regressors,
+      previous_regressors;
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, 2 * kJoint, 2 * kJoint>
       gravity_slope;
   SegmentVector mean_torque, along_x, along_y, force, gravity, shifted;

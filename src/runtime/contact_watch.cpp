@@ -25,6 +25,27 @@ ArmParameters up_to(const ArmParameters& arm, int segment) {
   return part;
 }
 
+struct MassFactor {
+  double value, log_variance;
+};
+
+/// Corrections and disturbance are relative to the configured mass: an arm that is heavier shows as
+/// one with less stiffness, damping, gain and disturbance. If all four are off by equal deviations,
+/// what the corrections have in common is shared with the mass, and this is the factor of the mass
+/// that is most likely. The force behind d is so many times d.
+MassFactor mass_factor(const SegmentCorrection& correction, const SegmentCorrection& deviation) {
+  constexpr double kPrior = 0.2;  // of each of the four
+  const double corrections[] = {correction.stiffness, correction.damping, correction.gain};
+  const double deviations[] = {deviation.stiffness, deviation.damping, deviation.gain};
+  double sum = 0.0, weights = 1.0 / (kPrior * kPrior);
+  for (std::size_t j = 0; j < 3; ++j) {
+    const double weight = 1.0 / (kPrior * kPrior + deviations[j] * deviations[j]);
+    sum -= weight * std::log1p(corrections[j]);
+    weights += weight;
+  }
+  return {std::exp(sum / weights), 1.0 / weights};
+}
+
 }  // namespace
 
 ContactWatch::ContactWatch(const ArmParameters& arm, const SafetySettings& settings)
@@ -66,6 +87,15 @@ void ContactWatch::judge(std::int64_t capture_ns, const ModelObserver& observer,
   last_ns_ = capture_ns;
   const SegmentVector& u = observer.newest_u_rad();
   tip_jacobian(part_, u.head(part_.dof()), jacobian_.leftCols(part_.dof()));
+  ModelCorrection deviation;
+  observer.deviation(deviation);
+  double log_variance = 0.0;
+  for (int i = 0; i < part_.size(); ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    const MassFactor mass = mass_factor(observer.correction().segment[k], deviation.segment[k]);
+    jacobian_.middleCols<2>(2 * i) /= mass.value;
+    log_variance += mass.log_variance / part_.size();
+  }
 
   sudden_nm_ = disturbance_nm - slow_nm_;
   const double sigmas = fit(observer, sudden_nm_, force_n_);
@@ -84,6 +114,7 @@ void ContactWatch::judge(std::int64_t capture_ns, const ModelObserver& observer,
     if (above) above_ns_ = capture_ns;
     contact_ = above || (contact_ && capture_ns - above_ns_ < to_ns(kEnd_s));
   }
+  covariance_n2_ += log_variance * force_n_ * force_n_.transpose();
   if (!contact_) slow_nm_ += -std::expm1(-since_s / kMemory_s) * (disturbance_nm - slow_nm_);
 }
 

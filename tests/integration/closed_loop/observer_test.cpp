@@ -248,6 +248,39 @@ TEST(ArmsOfEveryKind, AreTrackedWithTheObserver) {
   EXPECT_LT(error_of(point), 2e-3);
 }
 
+/// Reason for which the arm left ACTIVE within 20 s; none where it did not.
+Reason lost_for(const std::function<void(PlantSettings&)>& change) {
+  Experiment e = observed("as configured");
+  change(e.plant);
+  Loop loop(e);
+  bool was_active = false;
+  while (loop.time_s() < 20.0) {
+    const TickOutput& output = loop.tick();
+    if (was_active && output.mode != Mode::active) return output.reason;
+    was_active |= output.mode == Mode::active;
+  }
+  return was_active ? Reason::none : Reason::starting;
+}
+
+TEST(WrongModel, IsAFaultFarFromTheFileAndNoneNearIt) {
+  const auto scaled = [](double stiffness, double mass, double gain, double payload_kg) {
+    return [=](PlantSettings& plant) {
+      for (SegmentParameters& segment : plant.arm.segments) {
+        segment.stiffness_nm_per_rad *= stiffness;
+        segment.mass_kg *= mass;
+      }
+      for (auto& chambers : plant.actuation.segments)
+        for (Chamber& chamber : chambers) chamber.gain_nm_per_bar *= gain;
+      plant.payload_kg.back() = payload_kg;
+    };
+  };
+  EXPECT_EQ(lost_for(scaled(4.0, 1.0, 1.0, 0.0)), Reason::wrong_model);
+  EXPECT_EQ(lost_for(scaled(1.3, 0.7, 1.3, 0.0)), Reason::none);
+  EXPECT_EQ(lost_for(scaled(0.7, 1.3, 0.7, 0.0)), Reason::none);
+  EXPECT_EQ(lost_for(scaled(1.0, 1.0, 1.0, 0.15)), Reason::none);
+  EXPECT_EQ(lost_for(scaled(0.8, 0.8, 0.8, 0.15)), Reason::none);
+}
+
 TEST(ObserverSlow, NoFalseContactInAnHourOfTheReference) {
   Experiment e = pushed("mismatch 5 %", Eigen::Vector3d::Zero(), 1.0);
   Loop loop(e);

@@ -8,6 +8,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <limits>
 #include <stdexcept>
 
 #include "dev/bench/robustness_scenes.hpp"
@@ -99,6 +100,8 @@ RobustnessTrial run_processes(const Experiment& asked, const RobustnessScene& sc
   trial.tip_rms_m = summary.tip_rms_m();
   trial.nis = summary.nis();
   trial.surprised = summary.surprised_fraction();
+  trial.pressure_rate_bar_per_s = trial.tick_us = trial.frame_tick_us =
+      std::numeric_limits<double>::quiet_NaN();
   if (!began)
     throw std::runtime_error(scene.name + ": the arm was never ACTIVE\n" + daemon.printed() +
                              plant.printed());

@@ -1,6 +1,7 @@
 // The table and the JSON of softarm-dev bench robustness.
 #include <fmt/format.h>
 
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "dev/bench/robustness_scenes.hpp"
@@ -10,6 +11,13 @@ namespace {
 
 std::string cell_text(const RobustnessTrial& trial) {
   return trial.stayed_active ? fmt::format("{:.3g}", 1e3 * trial.u_rms_rad) : "left ACTIVE";
+}
+
+/// In ten columns; what is not measured is a dash.
+std::string column(double value, int decimals) {
+  if (std::isnan(value)) return fmt::format("{:>10}", "-");
+  return decimals > 0 ? fmt::format("{:>10.{}f}", value, decimals)
+                      : fmt::format("{:>10.3g}", value);
 }
 
 }  // namespace
@@ -33,10 +41,10 @@ std::string table(const std::vector<RobustnessRow>& rows, const std::vector<Obse
                       "[bar/s]", "[us]", "[us]", "", "[%]");
   for (const RobustnessRow& row : rows) {
     const RobustnessTrial& trial = row.cells.back().worst;
-    text += fmt::format("{:<36}{:>10.3g}{:>10.3g}{:>10.3g}{:>10.1f}{:>10.1f}{:>8.3f}{:>10.2g}\n",
-                        row.scene, 1e3 * trial.u_largest_rad, 1e3 * trial.tip_rms_m,
-                        trial.pressure_rate_bar_per_s, trial.tick_us, trial.frame_tick_us,
-                        trial.nis, 100.0 * trial.surprised);
+    text += fmt::format("{:<36}{:>10.3g}{:>10.3g}{}{}{}{:>8.3f}{:>10.2g}\n", row.scene,
+                        1e3 * trial.u_largest_rad, 1e3 * trial.tip_rms_m,
+                        column(trial.pressure_rate_bar_per_s, 0), column(trial.tick_us, 1),
+                        column(trial.frame_tick_us, 1), trial.nis, 100.0 * trial.surprised);
   }
   if (costs.empty()) return text;
   text += fmt::format("\n{:<36}{:>10}{:>10}\n", "the observer alone, segments", "tick [us]",

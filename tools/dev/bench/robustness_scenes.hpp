@@ -64,7 +64,7 @@ RobustnessTrial run(const Experiment& experiment, const RobustnessScene& scene, 
 /// Whether its faults stand between the programs, where no configuration puts them.
 bool needs_lock_step(const RobustnessScene& scene);
 /// The same over LCM, in real time: softarmd and softarm-plant beside this program, on a port that its
-/// process number chooses. Pressures and times of the tick are not measured.
+/// process number chooses. Pressures and times of the tick are not measured (NaN).
 /// @throws std::invalid_argument where the scene needs lock step; TransportError; std::runtime_error
 /// where the arm was never ACTIVE
 RobustnessTrial run_processes(const Experiment& experiment, const RobustnessScene& scene,
