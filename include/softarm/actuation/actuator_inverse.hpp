@@ -46,8 +46,9 @@ class ActuatorInverse {
  public:
   /// What the arm is asked to do, and where it is; 2n each, 3n where segments stretch.
   struct Motion {
-    ConstVectorRef u_rad;
-    ConstVectorRef reference_rad, reference_velocity_radps;
+    const SegmentVector& u_rad;
+    const SegmentVector& reference_rad;
+    const SegmentVector& reference_velocity_radps;
   };
 
   /// @param valve_lag_s T_0  @param period_s for which a set point is held

@@ -19,7 +19,9 @@ TEST(PipelineAllocation, TenThousandTicksThroughAllModes) {
   experiment.reference.phases.insert(experiment.reference.phases.begin(),
                                      {LiveReference{.timeout_s = 0.2}, 1.0});
   using enum ControlCoordinates;
-  ActuatorInverseSettings everything{.hysteresis = 0.1, .learn_hysteresis = true};
+  ActuatorInverseSettings everything;
+  everything.hysteresis = 0.1;
+  everything.learn_hysteresis = true;
   everything.fill_lag_s.assign(12, 0.04);
   everything.vent_lag_s.assign(12, 0.06);
   everything.stiffening_per_bar = 0.02;
