@@ -118,7 +118,7 @@ void LcmNode::dispatch(const lcm_recv_buf_t* packet, const char* /*channel*/, vo
 void LcmNode::subscribe(const std::string& channel, int capacity, Handler handler) {
   const bool first = subscriptions_.empty();  // it makes LCM open the socket
   const std::vector<bool> before = first ? bound_udp_sockets() : std::vector<bool>();
-  Subscription& stored = subscriptions_.emplace_back(std::move(handler), &arrivals_);
+  Subscription& stored = subscriptions_.emplace_back(Subscription{std::move(handler), &arrivals_});
   lcm_subscription_t* subscription =
       lcm_subscribe(lcm_, quoted(channel).c_str(), dispatch, &stored);
   if (subscription == nullptr)
