@@ -19,6 +19,8 @@ constexpr double kLongest_s = 10.0;             ///< lag of a chamber
 constexpr double kSaturation_1pbar = 0.5, kMostSaturation_1pbar = 2.0, kStiffening_1pbar = 0.5;
 constexpr double kSlip = 0.1, kSlipScale = 0.3;         ///< of k, a slip spring
 constexpr double kRemanent = 0.2, kRemanence_s = 20.0;  ///< share and time
+constexpr double kSetting_s = 1.0,
+                 kSetDecays_s = 30.0;  ///< of the length of an arm first stretched
 constexpr double kRemanentScale_rad = 0.05, kCross = 0.15;
 constexpr double kStretch_mpbar = 0.02, kOffsetScale_m = 0.02, kFrictionScale_m = 2e-3;
 constexpr double kLeastLoad_kg = 1e-3;  ///< scale of a load
@@ -213,17 +215,22 @@ void ParameterSet::add_memory(const FitChoice& choice) {
   };
   const Eigen::Index inputs = start_.input_map.cols();
   const double none = std::numeric_limits<double>::quiet_NaN(), inf = -kUnbounded;
-  if (choice.saturation) {
+  if (choice.saturation || choice.one_saturation) {
     if (start_.saturation_1pbar.size() != inputs) start_.saturation_1pbar.setZero(inputs);
-    for (Eigen::Index j = 0; j < inputs; ++j)
+    for (Eigen::Index j = 0; j < (choice.saturation ? inputs : 1); ++j)
       number(
-          fmt::format("saturation, chamber {}", j + 1), "1/bar", kSaturation_1pbar,
+          choice.saturation ? fmt::format("saturation, chamber {}", j + 1) : "saturation", "1/bar",
+          kSaturation_1pbar,
           [=](const ArmHypothesis& arm) {
             return arm.saturation_1pbar.size() > j ? arm.saturation_1pbar[j] : 0.0;
           },
-          [=](ArmHypothesis& arm, double value) {
+          [=, each = choice.saturation](ArmHypothesis& arm, double value) {
             if (arm.saturation_1pbar.size() != inputs) arm.saturation_1pbar.setZero(inputs);
-            arm.saturation_1pbar[j] = value;
+            if (each) {
+              arm.saturation_1pbar[j] = value;
+            } else {
+              arm.saturation_1pbar.setConstant(value);
+            }
           },
           -kMostSaturation_1pbar, kMostSaturation_1pbar, none);
   }
@@ -341,7 +348,8 @@ void ParameterSet::add_elongation(const FitChoice& choice) {
     one.difference = kCoarse;
     parameters_.push_back(std::move(one));
   };
-  for (Eigen::Index i = 0; i < n; ++i)
+  if (!choice.setting) it.rest_length_m.resize(0);
+  for (Eigen::Index i = 0; i < n && it.rest_length_m.size() == 0; ++i)
     number(
         fmt::format("length without pressure, segment {}", i + 1), "m",
         kOffsetScale_m, [=](auto& e) -> auto& { return e.offset_m[i]; }, 0.0, inf, none);
@@ -374,24 +382,37 @@ void ParameterSet::add_elongation(const FitChoice& choice) {
       if (!(it.lags[j].*time > 0.0)) one.expected = expected_s;
       parameters_.push_back(std::move(one));
     }
-  if (choice.saturation)
+  if (choice.saturation) {
     for (Eigen::Index j = 0; j < inputs; ++j)
       number(
           fmt::format("saturation of stretch, chamber {}", j + 1), "1/bar",
           kSaturation_1pbar, [=](auto& e) -> auto& { return e.saturation_1pbar[j]; },
           -kMostSaturation_1pbar, kMostSaturation_1pbar, none);
+  } else if (choice.one_saturation) {
+    number(
+        "saturation of stretch", "1/bar", kSaturation_1pbar,
+        [](auto& e) -> auto& { return e.saturation_1pbar[0]; }, -kMostSaturation_1pbar,
+        kMostSaturation_1pbar, none);
+    parameters_.back().set = [](ArmHypothesis& arm, double value) {
+      arm.elongation.saturation_1pbar.setConstant(value);
+    };
+  }
   if (choice.hysteresis)
     number(
         "friction of stretch", "m", kFrictionScale_m, [](auto& e) -> auto& { return e.friction_m; },
         0.0, inf, it.friction_m > 0.0 ? none : 0.25 * kFrictionScale_m);
-  if (choice.remanence) {
+  if (choice.remanence || choice.setting) {
     number(
         "remanence of stretch", "1", kRemanent, [](auto& e) -> auto& { return e.remanence.share; },
         0.0, inf, it.remanence.share > 0.0 ? none : 0.25 * kRemanent);
     number(
         "its time", "s", kRemanence_s, [](auto& e) -> auto& { return e.remanence.time_s; }, 1.0,
-        300.0, none);
+        300.0, choice.setting ? kSetDecays_s : none);
   }
+  if (choice.setting)
+    number(
+        "time in which it grows", "s", kSetting_s, [](auto& e) -> auto& { return e.setting_s; },
+        0.05, 300.0, it.setting_s > 0.0 ? none : kSetting_s);
 }
 
 Eigen::VectorXd ParameterSet::expected() const {

@@ -373,23 +373,38 @@ bool ResponseModel::simulate_balance(const ArmHypothesis& arm, double longest_st
   return true;
 }
 
+Eigen::VectorXd ElongationHypothesis::stretch_m(const Eigen::VectorXd& pressure_bar) const {
+  if (saturation_1pbar.size() == 0) return gain_m_per_bar * pressure_bar;
+  return gain_m_per_bar *
+         (pressure_bar.array() * (1.0 + saturation_1pbar.array() * pressure_bar.array())).matrix();
+}
+
+ElongationHypothesis ResponseModel::with_offset(const ElongationHypothesis& elongation) const {
+  ElongationHypothesis out = elongation;
+  if (!out.given() || out.rest_length_m.size() == 0) return out;
+  out.offset_m = out.rest_length_m - out.stretch_m(record_.input.value.row(0).transpose());
+  out.rest_length_m.resize(0);
+  return out;
+}
+
 void ResponseModel::simulate_lengths(const ArmHypothesis& arm, Eigen::MatrixXd& length_m) const {
-  const ElongationHypothesis& it = arm.elongation;
+  const ElongationHypothesis it = with_offset(arm.elongation);
   const Eigen::Index frames = record_.time_s.size(), n = it.offset_m.size();
   length_m.resize(frames, n);
   LaggedInput input(record_.input, it.lags, arm.dead_time_s);
   Eigen::VectorXd p(it.gain_m_per_bar.cols()), centre, remanent = Eigen::VectorXd::Zero(n);
+  Remanence growing = it.remanence;
+  if (it.setting_s > 0.0) growing.time_s = it.setting_s;
   for (Eigen::Index k = 0; k < frames; ++k) {
     input.at(record_.time_s[k], p);
-    for (Eigen::Index j = 0; j < it.saturation_1pbar.size(); ++j)
-      p[j] *= 1.0 + it.saturation_1pbar[j] * p[j];
-    const Eigen::VectorXd target = it.gain_m_per_bar * p;
+    const Eigen::VectorXd target = it.stretch_m(p);
     if (k == 0) centre = target;
     for (Eigen::Index i = 0; i < n; ++i) {
       centre[i] = std::clamp(centre[i], target[i] - it.friction_m, target[i] + it.friction_m);
-      if (k > 0 && it.remanence.share != 0.0)
-        remanent[i] =
-            it.remanence.step(remanent[i], centre[i], record_.time_s[k] - record_.time_s[k - 1]);
+      if (k == 0 || it.remanence.share == 0.0) continue;
+      const bool grows = it.remanence.share * centre[i] > remanent[i];
+      remanent[i] = (grows ? growing : it.remanence)
+                        .step(remanent[i], centre[i], record_.time_s[k] - record_.time_s[k - 1]);
     }
     length_m.row(k) = it.offset_m + centre + remanent;
   }

@@ -22,8 +22,14 @@ struct ElongationHypothesis {
   Eigen::VectorXd saturation_1pbar;  ///< of every input
   double friction_m = 0.0;           ///< half width of a play between pressure and length
   Remanence remanence;               ///< of the length beyond the offset, share of it
+  double setting_s = 0.0;  ///< time in which the remanence grows; 0: as it decays, remanence.time_s
+  /// n: the length when the record begins, m, under the pressures that it begins with; the offset
+  /// follows from it. Empty: not known, offset_m counts.
+  Eigen::VectorXd rest_length_m;
 
   bool given() const { return offset_m.size() > 0; }
+  /// What pressures behind the lag add to the offset without friction and remanence, n, m.
+  Eigen::VectorXd stretch_m(const Eigen::VectorXd& pressure_bar) const;
 };
 
 /// Everything the response depends on. What is zero or empty is left out and costs nothing.
@@ -90,6 +96,9 @@ class ResponseModel {
   /// first input. False if the response grows without bound or there is no equilibrium.
   [[nodiscard]] bool simulate(const ArmHypothesis& arm, double longest_step_s,
                               Eigen::MatrixXd& u) const;
+
+  /// The elongation with the offset that makes its known length at rest, which is then part of it.
+  ElongationHypothesis with_offset(const ElongationHypothesis& elongation) const;
 
   /// The length of every segment at every frame (n columns), m, by arm.elongation.
   void simulate_lengths(const ArmHypothesis& arm, Eigen::MatrixXd& length_m) const;

@@ -73,6 +73,64 @@ TEST(QuasiStatic, RemanenceIsTheStandardLinearSolid) {
   EXPECT_NEAR(u.bottomRows<1>().norm(), at_once / 0.7, 1e-3 * at_once);
 }
 
+TEST(Elongation, OfAKnownRestSetsQuicklyAndForgetsSlowly) {
+  // A step of pressure lengthens by g p at once and by share g p behind the setting time; after it
+  // the latter alone is left, and decays.
+  ArmHypothesis arm = configured(weightless());
+  ElongationHypothesis& it = arm.elongation;
+  it.offset_m.setConstant(1, 1.0);  // overruled by the length at rest
+  it.rest_length_m.setConstant(1, 0.15);
+  it.gain_m_per_bar.setConstant(1, 4, 0.02);
+  it.lags.assign(4, FillVentLag{});
+  it.saturation_1pbar.setConstant(4, -0.5);
+  it.remanence = {0.4, 8.0};
+  it.setting_s = 0.5;
+  const double rest_bar = 0.1, top_bar = 0.6, end_s = 3.0;
+  const MotionRecord record =
+      pressed(10.0, [&](double t) { return t > 0.01 && t < end_s ? top_bar : rest_bar; });
+  const auto pushes = [](double p) { return p * (1.0 - 0.5 * p); };
+  const double step = 0.02 * (pushes(top_bar) - pushes(rest_bar));
+  const double rest = 0.02 * pushes(rest_bar), set = 0.4 * 0.02 * pushes(top_bar);
+  Eigen::MatrixXd length;
+  const ResponseModel model(record);
+  model.simulate_lengths(arm, length);
+  EXPECT_NEAR(length(0, 0), 0.15, 1e-12);
+  double remanent = 0.0;
+  for (Eigen::Index k = 1; k < length.rows(); ++k) {
+    const bool pressed_now = record.input.value(k, 2) > 0.5 * top_bar;
+    const double t = record.time_s[k];
+    // From the rest's own share on, at 0.5 s; back to it at 8 s.
+    if (pressed_now) remanent = set * (1.0 - std::exp(-t / 0.5));
+    if (!pressed_now) remanent = 0.4 * rest + (remanent - 0.4 * rest) * std::exp(-0.05 / 8.0);
+    EXPECT_NEAR(length(k, 0), 0.15 + (pressed_now ? step : 0.0) + remanent, 1e-9) << t;
+  }
+  // The offset that makes this rest gives the same lengths.
+  arm.elongation = model.with_offset(it);
+  EXPECT_NEAR(arm.elongation.offset_m[0], 0.15 - rest, 1e-12);
+  Eigen::MatrixXd again;
+  model.simulate_lengths(arm, again);
+  EXPECT_LT((again - length).cwiseAbs().maxCoeff(), 1e-12);
+}
+
+TEST(InputTrack, AveragesOfMeasurementsStayOnStraightLines) {
+  InputTrack track;
+  track.held = false;
+  track.time_s = Eigen::VectorXd::LinSpaced(401, 0.0, 4.0);
+  track.value = (0.1 + 0.2 * track.time_s.array()).matrix();
+  const InputTrack few = track.averaged(0.05);
+  EXPECT_LT(few.time_s.size(), 90);
+  EXPECT_EQ(few.time_s[0], 0.0);
+  EXPECT_EQ(few.time_s[few.time_s.size() - 1], 4.0);
+  for (Eigen::Index k = 0; k < few.time_s.size(); ++k) {
+    EXPECT_NEAR(few.value(k, 0), 0.1 + 0.2 * few.time_s[k], 1e-12);
+    if (k > 0) {
+      EXPECT_GT(few.time_s[k], few.time_s[k - 1]);
+    }
+  }
+  track.held = true;
+  EXPECT_EQ(track.averaged(0.05).time_s.size(), 401);
+}
+
 TEST(LaggedInput, FillsAndVentsWithTwoTimes) {
   InputTrack track;
   track.time_s = Eigen::Vector3d(0.0, 1.0, 3.0);
