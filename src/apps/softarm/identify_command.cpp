@@ -84,6 +84,11 @@ int identify(IdentifyCommand& command) {
     const Refinement& fit = comparison.trials.back().result.whole;
     fmt::print("{}\nas asked, on the whole record:\n{}{}", comparison_text(comparison),
                fit_table(set, fit), residual_parts_text(residual_parts(record, fit)));
+    for (const ModelTrial& trial : comparison.trials) {
+      if (held_out.empty() || trial.result.found.empty()) continue;
+      fmt::print("{}, as found on the whole record\n", trial.name);
+      print_held_out(trial.result.found.front(), experiment, held_out, command);
+    }
     write_findings(experiment, command, set.arm(fit.x), fit, findings);
     return kExitOk;
   }
@@ -93,13 +98,13 @@ int identify(IdentifyCommand& command) {
         "{} predicts u to {:.4g} mrad rms a component; the motion's own is {:.4g} mrad rms "
         "about its mean\n",
         command.config, 1e3 * fit.rms_rad, 1e3 * fit.motion_rms_rad);
+    print_lengths(configured(experiment), experiment, record, "the lengths");
     write_findings(experiment, command, set.arm(fit.x), fit, findings);
     return kExitOk;
   }
   Refinement fit = softarm::identify(set, records, command.options);
-  const Misfit misfit =
-      judge_misfit(configured(experiment), experiment.actuation.kind, command.choice, records, fit,
-                   command.options.refinement, command.logs.empty());
+  const Misfit misfit = judge_misfit(configured(experiment), experiment.actuation.kind,
+                                     command.choice, records, fit, command.options.refinement);
   widen(misfit, fit);
   fmt::print("{}{}{}", fit_table(set, fit), conditioning_text(set, fit), misfit_text(misfit));
   if (command.logs.size() == 1) fmt::print("{}", residual_parts_text(residual_parts(record, fit)));

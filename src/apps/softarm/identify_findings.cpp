@@ -50,6 +50,17 @@ void write_findings(const Experiment& experiment, const IdentifyCommand& command
   fmt::print("{} has the values found: softarm run {}\n", command.output, command.output);
 }
 
+void print_lengths(const ArmHypothesis& arm, const Experiment& experiment,
+                   const MotionRecord& record, const std::string& what) {
+  if (!arm.elongation.given() || record.chord_m.rows() == 0) return;
+  FitChoice lengths;
+  lengths.elongation = lengths.chamber_lags = true;  // every lag as it is
+  const ParameterSet set(arm, experiment.actuation.kind, lengths);
+  const Refinement it = predict(set, record, set.of(arm));
+  fmt::print("{}: to {:.4g} mm rms a segment, of a motion of {:.4g} mm\n", what, 1e3 * it.rms_rad,
+             1e3 * it.motion_rms_rad);
+}
+
 void print_held_out(const ArmHypothesis& arm, const Experiment& experiment,
                     const std::vector<MotionRecord>& held_out, const IdentifyCommand& command) {
   FitChoice as_it_is = command.choice;
@@ -60,6 +71,7 @@ void print_held_out(const ArmHypothesis& arm, const Experiment& experiment,
     const Refinement it = predict(set, held_out[i], set.of(arm));
     fmt::print("{}, held out: predicted to {:.4g} mrad rms a component, of a motion of {:.4g}\n",
                command.held_out[i], 1e3 * it.rms_rad, 1e3 * it.motion_rms_rad);
+    print_lengths(arm, experiment, held_out[i], "its lengths");
   }
 }
 

@@ -15,6 +15,25 @@ constexpr double kMost = 1.5;       ///< causes that leave more than this times 
 constexpr int kRounds = 25;
 constexpr double kRadius = 0.3, kSlip = 0.05;  ///< of the spring that slips: of motion, of k
 
+constexpr double kBlock_s = 0.5;
+
+/// RMS of the means over `kBlock_s` beside that of means of white noise.
+double slow_ratio(const Refinement& fit, double noise_rad) {
+  double squares = 0.0, blocks = 0.0;
+  for (Eigen::Index first = 0; first < fit.time_s.size();) {
+    Eigen::Index end = first + 1;
+    // Records stand one behind the other: time falls back where one begins.
+    while (end < fit.time_s.size() && fit.time_s[end] >= fit.time_s[first] &&
+           fit.time_s[end] - fit.time_s[first] < kBlock_s)
+      ++end;
+    const auto mean = fit.residual_rad.middleRows(first, end - first).colwise().mean();
+    squares += static_cast<double>(end - first) * mean.squaredNorm();
+    blocks += static_cast<double>(mean.size());
+    first = end;
+  }
+  return std::sqrt(squares / blocks) / noise_rad;
+}
+
 struct Candidate {
   const char* name;
   bool FitChoice::*flag;
@@ -39,7 +58,8 @@ Misfit judge_misfit(const ArmHypothesis& start, ActuationKind kind, const FitCho
   }
   out.noise_rad = std::sqrt(squares / static_cast<double>(records.size()));
   out.ratio = fit.rms_rad / out.noise_rad;
-  out.significant = out.ratio > kMisfit;
+  out.slow_ratio = slow_ratio(fit, out.noise_rad);
+  out.significant = out.ratio > kMisfit || out.slow_ratio > kMisfit;
   if (!out.significant || !seek_causes) return out;
 
   const ParameterSet set(start, kind, choice);
@@ -76,13 +96,16 @@ Misfit judge_misfit(const ArmHypothesis& start, ActuationKind kind, const FitCho
     quick.most_rounds = kRounds;
     try {
       const Refinement tried = refine(wider, records, x, quick);
-      if (!(tried.rms_rad < kExplains * fit.rms_rad)) continue;
-      Tried it{
-          {candidate.name, tried.x[added] * wider[added].scale, wider[added].unit, tried.rms_rad},
-          Eigen::VectorXd::Zero(set.size())};
+      const double slow = slow_ratio(tried, out.noise_rad);
+      if (!(slow < kExplains * out.slow_ratio)) continue;
+      Tried it{{candidate.name, tried.x[added] * wider[added].scale, wider[added].unit,
+                tried.rms_rad, slow},
+               Eigen::VectorXd::Zero(set.size())};
       for (Eigen::Index i = 0; i < set.size(); ++i) {
         const Eigen::Index j = common[static_cast<std::size_t>(i)];
-        if (j >= 0) it.shift[i] = std::abs(tried.x[j] * wider[j].scale / set[i].scale - fit.x[i]);
+        if (j < 0) continue;
+        const double scale = wider[j].scale / set[i].scale;
+        it.shift[i] = std::abs(tried.x[j] * scale - fit.x[i]) + tried.half_width(j) * scale;
       }
       all.push_back(std::move(it));
     } catch (const std::runtime_error&) {
@@ -90,9 +113,9 @@ Misfit judge_misfit(const ArmHypothesis& start, ActuationKind kind, const FitCho
     }
   }
   std::sort(all.begin(), all.end(),
-            [](const Tried& a, const Tried& b) { return a.cause.rms_rad < b.cause.rms_rad; });
+            [](const Tried& a, const Tried& b) { return a.cause.slow_ratio < b.cause.slow_ratio; });
   for (const Tried& each : all) {
-    if (each.cause.rms_rad > kMost * all.front().cause.rms_rad) break;
+    if (each.cause.slow_ratio > kMost * all.front().cause.slow_ratio) break;
     out.causes.push_back(each.cause);
     out.shift = out.shift.cwiseMax(each.shift);
   }
@@ -109,14 +132,13 @@ std::string misfit_text(const Misfit& misfit) {
   if (!misfit.significant) return "";
   std::string text = fmt::format(
       "THE ARM IS NOT AS MODELLED: the residual is {:.3g} times the noise configured for the "
-      "frames "
-      "({:.3g} mrad)\n",
-      misfit.ratio, 1e3 * misfit.noise_rad);
+      "frames ({:.3g} mrad); its means over half a second are {:.3g} times theirs\n",
+      misfit.ratio, 1e3 * misfit.noise_rad, misfit.slow_ratio);
   for (const MisfitCause& cause : misfit.causes)
-    text += fmt::format("{}: {} ({:.4g} {}), which leaves {:.3g} times\n",
+    text += fmt::format("{}: {} ({:.4g} {}), which leaves {:.3g} and {:.3g} times\n",
                         &cause == &misfit.causes.front() ? "likely cause" : "or", cause.name,
                         cause.value, cause.unit == "1" ? "times" : cause.unit,
-                        cause.rms_rad / misfit.noise_rad);
+                        cause.rms_rad / misfit.noise_rad, cause.slow_ratio);
   if (misfit.causes.empty())
     return text +
            "no cause is known: intervals count noise only; --choose-terms and --load, --length, "

@@ -21,6 +21,24 @@ MotionRecord MotionRecord::part(double from_s, double to_s, double lead_s) const
   return out;
 }
 
+InputTrack InputTrack::averaged(double span_s) const {
+  const Eigen::Index count = time_s.size();
+  if (held || count < 3 || !(span_s > 0.0)) return *this;
+  InputTrack out = *this;
+  Eigen::Index to = 1;
+  for (Eigen::Index k = 1; k + 1 < count; ++to) {
+    const Eigen::Index first = k;
+    while (k + 1 < count && time_s[k] - time_s[first] < span_s) ++k;
+    out.time_s[to] = time_s.segment(first, k - first).mean();
+    out.value.row(to) = value.middleRows(first, k - first).colwise().mean();
+  }
+  out.time_s[to] = time_s[count - 1];
+  out.value.row(to) = value.row(count - 1);
+  out.time_s.conservativeResize(to + 1);
+  out.value.conservativeResize(to + 1, Eigen::NoChange);
+  return out;
+}
+
 MotionRecord MotionRecord::thinned(double apart_s) const {
   std::vector<Eigen::Index> kept;
   for (Eigen::Index k = 0; k < time_s.size(); ++k)

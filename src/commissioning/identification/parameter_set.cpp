@@ -213,17 +213,22 @@ void ParameterSet::add_memory(const FitChoice& choice) {
   };
   const Eigen::Index inputs = start_.input_map.cols();
   const double none = std::numeric_limits<double>::quiet_NaN(), inf = -kUnbounded;
-  if (choice.saturation) {
+  if (choice.saturation || choice.one_saturation) {
     if (start_.saturation_1pbar.size() != inputs) start_.saturation_1pbar.setZero(inputs);
-    for (Eigen::Index j = 0; j < inputs; ++j)
+    for (Eigen::Index j = 0; j < (choice.saturation ? inputs : 1); ++j)
       number(
-          fmt::format("saturation, chamber {}", j + 1), "1/bar", kSaturation_1pbar,
+          choice.saturation ? fmt::format("saturation, chamber {}", j + 1) : "saturation", "1/bar",
+          kSaturation_1pbar,
           [=](const ArmHypothesis& arm) {
             return arm.saturation_1pbar.size() > j ? arm.saturation_1pbar[j] : 0.0;
           },
-          [=](ArmHypothesis& arm, double value) {
+          [=, each = choice.saturation](ArmHypothesis& arm, double value) {
             if (arm.saturation_1pbar.size() != inputs) arm.saturation_1pbar.setZero(inputs);
-            arm.saturation_1pbar[j] = value;
+            if (each) {
+              arm.saturation_1pbar[j] = value;
+            } else {
+              arm.saturation_1pbar.setConstant(value);
+            }
           },
           -kMostSaturation_1pbar, kMostSaturation_1pbar, none);
   }
@@ -374,12 +379,21 @@ void ParameterSet::add_elongation(const FitChoice& choice) {
       if (!(it.lags[j].*time > 0.0)) one.expected = expected_s;
       parameters_.push_back(std::move(one));
     }
-  if (choice.saturation)
+  if (choice.saturation) {
     for (Eigen::Index j = 0; j < inputs; ++j)
       number(
           fmt::format("saturation of stretch, chamber {}", j + 1), "1/bar",
           kSaturation_1pbar, [=](auto& e) -> auto& { return e.saturation_1pbar[j]; },
           -kMostSaturation_1pbar, kMostSaturation_1pbar, none);
+  } else if (choice.one_saturation) {
+    number(
+        "saturation of stretch", "1/bar", kSaturation_1pbar,
+        [](auto& e) -> auto& { return e.saturation_1pbar[0]; }, -kMostSaturation_1pbar,
+        kMostSaturation_1pbar, none);
+    parameters_.back().set = [](ArmHypothesis& arm, double value) {
+      arm.elongation.saturation_1pbar.setConstant(value);
+    };
+  }
   if (choice.hysteresis)
     number(
         "friction of stretch", "m", kFrictionScale_m, [](auto& e) -> auto& { return e.friction_m; },

@@ -56,6 +56,7 @@ void QuasiStaticMotion::load(const Eigen::VectorXd& input) {
     for (Eigen::Index c = 0; c < stiffness_.size(); ++c)
       stiffness_[c] *= std::max(0.05, 1.0 + arm_.stiffening_1pbar * sum[c / 2]);
   }
+  if (arm_.arm.actuation == ActuationModel::chamber) actuation_force(arm_, u_, input_, force_);
 }
 
 /// What is left of the balance: springs + G - input.
@@ -66,7 +67,8 @@ void QuasiStaticMotion::balance(const Eigen::VectorXd& u, Eigen::VectorXd& out) 
     out.setZero();
   }
   if (arm_.load_kg > 0.0) add_load_moments(arm_, u, out);
-  actuation_force(arm_, u, input_, force_);
+  // Chambers push alike in every shape: what `load` found holds.
+  if (arm_.arm.actuation != ActuationModel::chamber) actuation_force(arm_, u, input_, force_);
   out -= force_;
   for (Eigen::Index i = 0; i < u.size(); i += 2) {
     const Eigen::Vector2d bend = u.segment<2>(i) - rest_.segment<2>(i);
@@ -114,9 +116,12 @@ bool QuasiStaticMotion::solve(double damped_s, const Eigen::VectorXd& base, Eige
     }
     if (fresh && length > 0.7 * before) change_ *= 0.5;
     fresh = fresh || length > kSlow * before;
-    before = length;
     u -= change_;
-    if (length < kBalanced_rad) return u.cwiseAbs().maxCoeff() < kLargest_rad;
+    // What is left behind a step, as long as they shorten in the same ratio.
+    const double ratio = length / before;  // 0 in the first round, which says nothing
+    const double left = ratio > 0.0 && ratio < 0.5 ? length * ratio / (1.0 - ratio) : length;
+    before = length;
+    if (left < kBalanced_rad) return u.cwiseAbs().maxCoeff() < kLargest_rad;
   }
   return before < 1e-7 && u.cwiseAbs().maxCoeff() < kLargest_rad;
 }
@@ -131,11 +136,12 @@ bool QuasiStaticMotion::settle(const Eigen::VectorXd& input) {
 }
 
 bool QuasiStaticMotion::step(double step_s, const Eigen::VectorXd (&inputs)[kStages]) {
-  stage_ = u_;
   for (int i = 0; i < kStages; ++i) {
     base_ = u_;
     for (int j = 0; j < i; ++j) base_ += step_s * kWeights[i][j] * rates_[j];
     load(inputs[i]);
+    // From where the stage before, or the last of the step before, would lead.
+    stage_ = base_ + kGamma * step_s * rates_[i > 0 ? i - 1 : kStages - 1];
     if (!solve(kGamma * step_s, base_, stage_)) return false;
     rates_[i] = (stage_ - base_) / (kGamma * step_s);
   }

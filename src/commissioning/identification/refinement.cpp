@@ -20,6 +20,7 @@ constexpr double kHeldAbove = 1.0;  ///< standard error of a combination that is
 constexpr double kNoiseFloor_rad = 1e-9;  ///< no motion capture is better
 constexpr int kWeightings = 3;
 constexpr double kStillStable = 0.75;  ///< of the longest step, which is short of the stable one
+constexpr double kSlowAdvance = 0.3;   ///< steps that shorten less need new sensitivities
 constexpr double kNear = 0.02;         ///< sensitivities of a point so near serve for intervals
 
 /// Frames as columns: all components of a frame stand together, records one behind the other.
@@ -241,12 +242,13 @@ class Search {
       const Eigen::VectorXd x = (out.x + step).cwiseMax(lowest_).cwiseMin(highest_);
       const double stable_s = comparison_.stable_step_s(x, step_s_);
       if (comparison_.simulate(x, stable_s, tried) && cost(tried, x) <= before) {
+        update(x - out.x, tried - u);
         out.x = x;
         u = tried;
         step_s_ = stable_s;
         damping = std::max(1e-12, 0.1 * damping);
         out.converged = small || (fresh && before - cost(u, x) < options_.least_gain);
-        slow_ = length > 0.05 * length_;
+        slow_ = length > kSlowAdvance * length_;
         length_ = slow_ ? std::numeric_limits<double>::infinity() : length;
         report_progress(out);
         return true;
@@ -264,6 +266,13 @@ class Search {
     }
     out.converged = promised < options_.least_gain;  // recorded inputs have kinks
     return false;
+  }
+
+  /// Broyden's update: the sensitivities explain the last step exactly.
+  void update(const Eigen::VectorXd& step, const Eigen::MatrixXd& change) {
+    const double squared = step.squaredNorm();
+    if (!(squared > 0.0)) return;
+    J_ += (change.reshaped() - J_ * step) / squared * step.transpose();
   }
 
   void report_progress(const Refinement& out) const {

@@ -21,7 +21,8 @@ constexpr Term kOfBend[] = {
     {"rest", &FitChoice::rest},
     {"cross-coupling", &FitChoice::cross},
     {"hysteresis", &FitChoice::hysteresis},
-    {"saturation", &FitChoice::saturation},
+    {"saturation", &FitChoice::one_saturation},
+    {"saturation of every chamber", &FitChoice::saturation},
     {"lags of every chamber", &FitChoice::chamber_lags},
     {"masses", &FitChoice::mass},
     {"remanence", &FitChoice::remanence},
@@ -30,12 +31,16 @@ constexpr Term kOfBend[] = {
     {"cubic stiffness", &FitChoice::cubic},
 };
 constexpr Term kOfElongation[] = {
-    {"saturation", &FitChoice::saturation}, {"lags of every chamber", &FitChoice::chamber_lags},
-    {"friction", &FitChoice::hysteresis},   {"remanence", &FitChoice::remanence},
+    {"remanence", &FitChoice::remanence},
+    {"saturation", &FitChoice::one_saturation},
+    {"saturation of every chamber", &FitChoice::saturation},
+    {"friction", &FitChoice::hysteresis},
+    {"lags of every chamber", &FitChoice::chamber_lags},
     {"cross-coupling", &FitChoice::cross},
 };
-constexpr double kNarrowerPriors[] = {0.5, 0.25};
-constexpr double kRadii[] = {0.3, 1.0, 2.5};  ///< of slip springs, of the motion's RMS
+constexpr double kPriors[] = {2.0, 0.5, 0.25};  ///< tried at the end, times that given
+constexpr double kLeastGain = 0.05;             ///< of a search, in squared standard errors
+constexpr double kRadii[] = {0.3, 1.0, 2.5};    ///< of slip springs, of the motion's RMS
 
 /// RMS of a component of the motion about its mean.
 double motion_rms(const Eigen::MatrixXd& rows) {
@@ -78,18 +83,17 @@ class Selection {
       out.prior = prior;
       best = std::move(tried);
     };
-    for (const Term& term :
-         plain.elongation ? std::span<const Term>(kOfElongation) : std::span<const Term>(kOfBend)) {
-      if (plain.*term.flag || !applies(term)) continue;
-      FitChoice with = out.choice;
-      with.*term.flag = true;
-      consider(term.name, with, out.prior);
+    if (plain.elongation) {
+      add_best(out, best);
+    } else {
+      for (const Term& term : kOfBend)
+        if (applies(term, out.choice)) consider(term.name, with(out.choice, term), out.prior);
     }
-    if (out.prior > 0.0)
-      for (const double part : kNarrowerPriors)
-        consider(fmt::format("prior of {:.0f} %", 100.0 * part * options_.identify.refinement.prior)
-                     .c_str(),
-                 out.choice, part * options_.identify.refinement.prior);
+    const double given = out.prior;
+    if (given > 0.0)
+      for (const double part : kPriors)
+        consider(fmt::format("prior of {:.0f} %", 100.0 * part * given).c_str(), out.choice,
+                 part * given);
     const ParameterSet set(start_, kind_, out.choice);
     out.whole = find(set, records_, out.prior, best.arms);
     out.arm = set.arm(out.whole.x);
@@ -98,14 +102,50 @@ class Selection {
   }
 
  private:
-  bool applies(const Term& term) const {
+  bool applies(const Term& term, const FitChoice& choice) const {
+    if (choice.*term.flag) return false;
+    if (term.flag == &FitChoice::one_saturation) return !choice.saturation;
     return term.flag != &FitChoice::cross || start_.arm.size() > 1;
+  }
+
+  static FitChoice with(FitChoice choice, const Term& term) {
+    choice.*term.flag = true;
+    return choice;
+  }
+
+  /// Again and again the best of the terms of the elongation that are left, as long as it gains.
+  void add_best(SelectedModel& out, Attempt& best) {
+    for (;;) {
+      std::vector<Attempt> tried;
+      std::vector<FitChoice> choices;
+      for (const Term& term : kOfElongation) {
+        if (!applies(term, out.choice)) continue;
+        choices.push_back(with(out.choice, term));
+        tried.push_back(attempt(term.name, choices.back(), out.prior, &best));
+      }
+      std::size_t least = 0;
+      for (std::size_t i = 1; i < tried.size(); ++i)
+        if (!std::isfinite(tried[least].trial.unseen) ||
+            tried[i].trial.unseen < tried[least].trial.unseen)
+          least = i;
+      const bool gains = !tried.empty() && tried[least].trial.unseen <
+                                               (1.0 - options_.least_gain) * best.trial.unseen;
+      if (!gains) {
+        for (const Attempt& each : tried) out.trials.push_back(each.trial);
+        return;
+      }
+      tried[least].trial.kept = true;
+      out.trials.push_back(tried[least].trial);
+      out.choice = choices[least];
+      best = std::move(tried[least]);
+    }
   }
 
   Refinement find(const ParameterSet& set, std::span<const MotionRecord> records, double prior,
                   const std::vector<ArmHypothesis>& near) const {
     IdentifyOptions options = options_.identify;
     options.refinement.prior = prior;
+    options.refinement.least_gain = std::max(kLeastGain, options.refinement.least_gain);
     options.near.insert(options.near.end(), near.begin(), near.end());
     return identify(set, records, options);
   }
@@ -176,7 +216,21 @@ std::vector<Fold> folds_of(std::span<const MotionRecord> records) {
 SelectedModel select_terms(const ArmHypothesis& start, ActuationKind kind, const FitChoice& plain,
                            std::span<const MotionRecord> records, const std::vector<Fold>& folds,
                            const SelectionOptions& options) {
-  return Selection(start, kind, records, folds, options).run(plain);
+  if ((plain.inertia && !plain.elongation) || !(options.apart_s > 0.0))
+    return Selection(start, kind, records, folds, options).run(plain);
+  const auto thinned = [&](const MotionRecord& record) {
+    MotionRecord out = record.thinned(options.apart_s);
+    out.input = record.input.averaged(0.5 * options.apart_s);
+    return out;
+  };
+  std::vector<MotionRecord> few;
+  for (const MotionRecord& each : records) few.push_back(thinned(each));
+  std::vector<Fold> few_folds;
+  for (const Fold& fold : folds) {
+    few_folds.push_back({{}, thinned(fold.unseen)});
+    for (const MotionRecord& each : fold.seen) few_folds.back().seen.push_back(thinned(each));
+  }
+  return Selection(start, kind, few, few_folds, options).run(plain);
 }
 
 std::string selection_text(const SelectedModel& model, double motion, double unit,
@@ -187,6 +241,10 @@ std::string selection_text(const SelectedModel& model, double motion, double uni
       unit_name, unit * motion, "term", "unknowns", "unseen", "gain", "of every part");
   double best = model.trials.front().unseen;
   for (const TermTrial& trial : model.trials) {
+    if (!std::isfinite(trial.unseen)) {
+      text += fmt::format("{:<26}{:>10}  no bounded response\n", trial.name, trial.parameters);
+      continue;
+    }
     std::string parts;
     for (const double each : trial.unseen_of) parts += fmt::format("{:8.2f}", unit * each);
     text += fmt::format("{:<26}{:>10}{:>10.2f}{:>9.1f}%{}  {}\n", trial.name, trial.parameters,

@@ -1,4 +1,6 @@
 // k, beta and gains from step responses of arms that are known.
+#include "softarm/commissioning/identification/identify.hpp"
+
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -9,6 +11,7 @@
 #include "integration/processes/process.hpp"
 #include "softarm/commissioning/identification/coverage.hpp"
 #include "softarm/commissioning/identification/linear_fit.hpp"
+#include "softarm/commissioning/identification/misfit.hpp"
 #include "softarm/config/load.hpp"
 #include "test_folder.hpp"
 
@@ -129,6 +132,63 @@ TEST(Identify, WritesAnExperimentWhosePlantIsUnchanged) {
       EXPECT_NEAR(before.plant.actuation.segments[i][j].gain_nm_per_bar,
                   after.plant.actuation.segments[i][j].gain_nm_per_bar, 1e-5);
   }
+}
+
+/// What identification finds from steps of the simulated arm, with intervals as it would print them.
+struct Judged {
+  ParameterSet set;
+  Refinement fit;
+  Misfit misfit;
+  double half_width(const std::string& name) const { return fit.half_width(find(name)); }
+  double value(const std::string& name) const { return fit.x[find(name)] * set[find(name)].scale; }
+  Eigen::Index find(const std::string& name) const {
+    for (Eigen::Index i = 0; i < set.size(); ++i)
+      if (set[i].name == name) return i;
+    throw std::out_of_range(name);
+  }
+};
+
+Judged judged(const Experiment& experiment) {
+  const FitChoice choice;
+  StepPlan plan;
+  plan.hold_s = 0.5;
+  const MotionRecord record = record_step_response(experiment, plan);
+  const ArmHypothesis start = configured(experiment);
+  Judged out{ParameterSet(start, experiment.actuation.kind, choice), {}, {}};
+  IdentifyOptions options;
+  options.refinement.threads = 2;
+  out.fit = identify(out.set, record, options);
+  out.misfit = judge_misfit(start, experiment.actuation.kind, choice, std::span(&record, 1),
+                            out.fit, options.refinement);
+  widen(out.misfit, out.fit);
+  return out;
+}
+
+TEST(SlowIdentify, APayloadThatIsNotInTheFileIsNamedAndIntervalsHoldTheTruth) {
+  Experiment experiment = load_experiment(kConfig / "paper_arm.yaml");
+  const Judged right = judged(experiment);
+  EXPECT_FALSE(right.misfit.significant) << right.misfit.ratio << " " << right.misfit.slow_ratio;
+  EXPECT_LT(right.half_width("stiffness k"), 0.03);
+
+  experiment.plant.payload_kg = {0.0, 0.0, 0.05};
+  const Judged loaded = judged(experiment);
+  EXPECT_TRUE(loaded.misfit.significant);
+  ASSERT_FALSE(loaded.misfit.causes.empty());
+  EXPECT_EQ(loaded.misfit.causes.front().name, "load at the tip");
+  EXPECT_NEAR(loaded.misfit.causes.front().value, 0.05, 0.005);
+  const auto holds = [&](const std::string& name, double truth) {
+    const double scale = loaded.set[loaded.find(name)].scale;
+    EXPECT_LT(std::abs(loaded.value(name) - truth), loaded.half_width(name) * scale) << name;
+  };
+  holds("stiffness k", experiment.plant.arm.segments[0].stiffness_nm_per_rad);
+  for (int i = 1; i <= 3; ++i)
+    for (int j = 1; j <= 4; ++j) {
+      const Chamber& chamber =
+          experiment.plant.actuation
+              .segments[static_cast<std::size_t>(i - 1)][static_cast<std::size_t>(j - 1)];
+      holds("gain, segment " + std::to_string(i) + " chamber " + std::to_string(j),
+            chamber.gain_nm_per_bar);
+    }
 }
 
 }  // namespace

@@ -24,8 +24,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr double kApart_s = 0.05, kWindow_s = 1.0, kLead_s = 10.0;
-// Of the selection: a tenth of a second is a tenth of the shortest lag of these arms.
-constexpr double kSelectionApart_s = 0.1, kSelectionGain = 0.05;
 constexpr int kMostRounds = 120;
 constexpr double kCycle_s = 10.0, kCycleWithin_s = 0.3;
 
@@ -197,20 +195,17 @@ class Arena {
   /// Terms chosen by what was not seen.
   void choose(const Loaded& loaded, const std::vector<Loaded>& others) {
     const std::vector<Fold> folds = halves(loaded.record);
-    const MotionRecord thinned = loaded.record.thinned(kSelectionApart_s);
-    const std::span<const MotionRecord> all(&thinned, 1);
-    const std::vector<Fold> judged = halves(thinned);
+    const std::span<const MotionRecord> all(&loaded.record, 1);
     SelectionOptions options;
     const ActuationKind kind = loaded.experiment.actuation.kind;
     const std::string& name = loaded.recording.name;
     const auto begin = std::chrono::steady_clock::now();
     const auto select = [&](const std::string& what, const FitChoice& plain) {
       options.identify = search(name + ", " + what);
-      options.identify.refinement.least_gain = kSelectionGain;
       options.progress = [&](const std::string& text) {
         progress_(fmt::format("{}, {}: {}", name, what, text));
       };
-      return select_terms(configured(loaded.experiment), kind, plain, all, judged, options);
+      return select_terms(configured(loaded.experiment), kind, plain, all, folds, options);
     };
     FitChoice length;
     length.elongation = true;

@@ -15,20 +15,25 @@ struct MisfitCause {
   double value = 0.0;  ///< of its first unknown, in `unit`
   std::string unit;
   double rms_rad = 0.0;
+  double slow_ratio = 0.0;  ///< as `Misfit::slow_ratio`, with it
 };
 
 /// The residual beside the noise of the frames.
 struct Misfit {
   double noise_rad = 0.0;  ///< RMS of a component, as configured; 0: not known, nothing is judged
   double ratio = 0.0;      ///< of the residual's RMS to it
+  /// The same of means over half a second, in what means of white noise have: 1 without misfit. What
+  /// is wrong with a model is slow beside the frames, so this shows far less of it.
+  double slow_ratio = 0.0;
   bool significant = false;
   std::vector<MisfitCause> causes;  ///< those that explain some of it, the likeliest first
-  /// By how much the unknowns change with the causes, at most, in the scales of the set: noise does
-  /// not make this error, so intervals that count it alone are too narrow.
+  /// How far what the causes give, with its interval, reaches from the unknowns, at most, in the scales
+  /// of the set: noise does not make this error, so intervals that count it alone are too narrow.
   Eigen::VectorXd shift;
 };
 
-/// A residual beyond 1.25 times the noise is no noise (a thousand frames scatter by 3 %). Then a load
+/// A residual, or its means over half a second, beyond 1.25 times what noise has is no noise (a thousand
+/// frames scatter by 3 %). Then a load
 /// at the tip, another length, other masses, hysteresis, a rest offset and a cubic stiffness are
 /// freed in turn, as far as `choice` has them fixed; each takes as long as identifying.
 /// @param seek_causes  false: none of that

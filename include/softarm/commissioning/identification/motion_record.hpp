@@ -13,6 +13,9 @@ struct InputTrack {
   Eigen::VectorXd time_s;  ///< ascending
   Eigen::MatrixXd value;   ///< one row per time
   bool held = true;        ///< true: held until the next sample; false: linear between samples
+
+  /// Measured samples averaged over spans of `span_s`; the first and the last stay. Held ones stay.
+  InputTrack averaged(double span_s) const;
 };
 
 /// Measured u and input of a motion.

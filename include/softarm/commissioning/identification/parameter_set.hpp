@@ -36,11 +36,12 @@ struct FitChoice {
   bool rest = false;
   bool cubic = false;
   bool venting = false;  ///< another lag for venting than for filling, the same in all chambers
-  bool chamber_lags = false;  ///< filling and venting of every chamber
-  bool saturation = false;    ///< of every chamber: p counts as p (1 + q p)
-  bool hysteresis = false;    ///< slip springs, at radii taken from the motion
-  bool remanence = false;     ///< the rest creeps after use: share, time, and where it is at first
-  bool stiffening = false;    ///< k (1 + s sum p)
+  bool chamber_lags = false;    ///< filling and venting of every chamber
+  bool one_saturation = false;  ///< p counts as p (1 + q p), the same q in all chambers
+  bool saturation = false;      ///< the same with a q of every chamber
+  bool hysteresis = false;      ///< slip springs, at radii taken from the motion
+  bool remanence = false;   ///< the rest creeps after use: share, time, and where it is at first
+  bool stiffening = false;  ///< k (1 + s sum p)
   /// Chambers act on the segments nearer the base, too, which their tendons or tubes pass.
   bool cross = false;
   bool mass = false;    ///< one factor on all masses, against the configured ones

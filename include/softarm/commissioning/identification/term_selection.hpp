@@ -47,13 +47,18 @@ struct SelectedModel {
 struct SelectionOptions {
   IdentifyOptions identify;
   double least_gain = 0.01;  ///< relative, of the error on what was not seen; less is no gain
+  /// Without inertia, frames so far apart are searched with, and measured pressures are averaged over
+  /// half of it: a tenth of the shortest lag of such arms.
+  double apart_s = 0.1;
   std::function<void(const std::string&)> progress;  ///< may be empty
 };
 
-/// Begins with `plain` and adds, in the order of the value that they had on real arms, one term at a
-/// time: asymmetric lag, rest, cross-coupling, hysteresis, saturation, lags of every chamber, masses (gravity beside
-/// k), remanence, delay, stiffening, cubic stiffness. A term stays if the error on
-/// what was not seen becomes less by `least_gain`; then narrower priors are tried in the same way.
+/// Begins with `plain` and adds one term at a time. Of the bend, in the order of the value that they
+/// had on real arms: asymmetric lag, rest, cross-coupling, hysteresis, saturation, lags of every
+/// chamber, masses (gravity beside k), remanence, delay, stiffening, cubic stiffness. Of the
+/// elongation, which is quick, the best of all that are left each time. A term stays if the error on
+/// what was not seen becomes less by `least_gain`; then other widths of the prior are tried in the same
+/// way.
 /// @param start  what is configured; every segment gets slip springs at radii taken from the motion
 /// @throws std::runtime_error as `identify`, of the plain model only
 SelectedModel select_terms(const ArmHypothesis& start, ActuationKind kind, const FitChoice& plain,

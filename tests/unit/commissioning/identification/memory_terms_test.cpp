@@ -73,6 +73,25 @@ TEST(QuasiStatic, RemanenceIsTheStandardLinearSolid) {
   EXPECT_NEAR(u.bottomRows<1>().norm(), at_once / 0.7, 1e-3 * at_once);
 }
 
+TEST(InputTrack, AveragesOfMeasurementsStayOnStraightLines) {
+  InputTrack track;
+  track.held = false;
+  track.time_s = Eigen::VectorXd::LinSpaced(401, 0.0, 4.0);
+  track.value = (0.1 + 0.2 * track.time_s.array()).matrix();
+  const InputTrack few = track.averaged(0.05);
+  EXPECT_LT(few.time_s.size(), 90);
+  EXPECT_EQ(few.time_s[0], 0.0);
+  EXPECT_EQ(few.time_s[few.time_s.size() - 1], 4.0);
+  for (Eigen::Index k = 0; k < few.time_s.size(); ++k) {
+    EXPECT_NEAR(few.value(k, 0), 0.1 + 0.2 * few.time_s[k], 1e-12);
+    if (k > 0) {
+      EXPECT_GT(few.time_s[k], few.time_s[k - 1]);
+    }
+  }
+  track.held = true;
+  EXPECT_EQ(track.averaged(0.05).time_s.size(), 401);
+}
+
 TEST(LaggedInput, FillsAndVentsWithTwoTimes) {
   InputTrack track;
   track.time_s = Eigen::Vector3d(0.0, 1.0, 3.0);
