@@ -95,6 +95,10 @@ CsvTable read_csv(const std::filesystem::path& file, std::optional<char> separat
     if (last > written || body.position + 3 > written)
       text.fail(text.rows[0].line, fmt::format("expected all columns of {}", body.name));
   }
+  if (table.time_column && *table.time_column >= written)
+    text.fail(text.rows[header.first_row - 1].line,
+              fmt::format("expected times in column {}, got {} columns", *table.time_column + 1,
+                          written));
   add_derived(table, header);
   double first_frame = kNone;
   for (std::size_t k = header.first_row; k < text.rows.size(); ++k) {

@@ -47,6 +47,7 @@ void run_table(std::span<const std::byte> input) {
     read = read_csv(table.path());
     require(read.cells.size() == read.rows() * read.columns.size() && read.rows() > 0,
             "a table has a cell for every row and column");
+    require(!read.time_column || *read.time_column < read.columns.size(), "times are in the table");
     for (const TableBody& each : read.bodies)
       require(*std::max_element(each.position.begin(), each.position.end()) < read.columns.size() &&
                   *std::max_element(each.orientation.begin(), each.orientation.end()) <
