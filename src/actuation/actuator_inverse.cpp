@@ -154,10 +154,11 @@ void ActuatorInverse::take_material(const Motion& motion, const PressureVector& 
 void ActuatorInverse::allocate(const PressureAllocator& allocator, ConstVectorRef tau_nm,
                                const Motion& motion, Allocation& out) noexcept {
   tau_nm_ = tau_nm;
-  for (int step = 0; step < kSteps; ++step) {
+  for (int step = 1;; ++step) {
     allocator.allocate(tau_nm_, out);
     for (Eigen::Index j = 0; j < pressure_bar_.size(); ++j)
       out.pressures_bar[j] = set_point(j, out.pressures_bar[j]);
+    if (step == kSteps) return;
     effective_torque(allocator, out.pressures_bar, motion, effective_nm_);
     tau_nm_ += tau_nm - effective_nm_;
   }
