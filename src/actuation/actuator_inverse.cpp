@@ -26,12 +26,6 @@ double approach(double period_s, double lag_s) {
   return lag_s > 0.0 ? -std::expm1(-period_s / lag_s) : 1.0;
 }
 
-/// Of a list with a number a chamber, or empty; 0: the target.
-double lag_of(const std::vector<double>& lag_s, std::size_t chamber, double target_s) {
-  const double own_s = lag_s.empty() ? 0.0 : lag_s.at(chamber);
-  return own_s > 0.0 ? own_s : target_s;
-}
-
 void check(const ActuationSettings& actuation, const ActuatorInverseSettings& it,
            double valve_lag_s) {
   const auto expect = [](bool holds, const char* expected, double got) {
@@ -99,8 +93,7 @@ ActuatorInverse::ActuatorInverse(const ArmParameters& arm, const ActuationSettin
   for (const auto& segment : actuation.segments)
     chambers_.push_back(static_cast<int>(segment.size()));
   for (std::size_t j = 0; j < static_cast<std::size_t>(pressure_bar_.size()); ++j) {
-    const FillVentLag lag{lag_of(settings.fill_lag_s, j, valve_lag_s),
-                          lag_of(settings.vent_lag_s, j, valve_lag_s)};
+    const FillVentLag lag = settings.lag(j, valve_lag_s);
     lag_.push_back(lag);
     approach_.push_back({approach(period_s, lag.fill_s), approach(period_s, lag.vent_s)});
   }

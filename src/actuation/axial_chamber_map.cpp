@@ -10,8 +10,6 @@
 namespace softarm {
 namespace {
 
-/// Sine of the angle below which two columns, or a column and a facet, count as parallel.
-constexpr double kParallel = 1e-12;
 /// Of what all chambers give together: how far inside the reachable set a target is kept, so that
 /// the projection onto the box never has to find a vertex by round-off.
 constexpr double kInside = 1e-9;

@@ -9,6 +9,9 @@
 
 namespace softarm {
 
+/// Sine of the angle below which two columns, or a column and a facet, count as parallel.
+inline constexpr double kParallel = 1e-12;
+
 /// Solves min 1/2 |p - b|^2 subject to W p = t, lo <= p <= hi, for at most Capacity unknowns, by
 /// the dual active-set method (Goldfarb and Idnani, Math. Programming 27, 1983) written for this
 /// problem.

@@ -9,8 +9,6 @@ namespace softarm {
 namespace {
 
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
-constexpr double kParallel =
-    1e-12;  ///< sine of the angle below which two columns count as parallel
 
 template <int D>
 double dot(const std::array<double, D>& a, const std::array<double, D>& b) {

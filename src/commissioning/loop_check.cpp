@@ -165,12 +165,15 @@ void keep_smallest(const LoopMargins& found, LoopMargins& kept) {
   kept.delay_s = std::min(kept.delay_s, found.delay_s);
 }
 
-/// Of a list with a number a chamber, or empty; 0: what is left out.
-double mean_lag_s(const std::vector<double>& lag_s, double left_out_s) {
-  if (lag_s.empty()) return left_out_s;
-  double sum = 0.0;
-  for (const double each_s : lag_s) sum += each_s > 0.0 ? each_s : left_out_s;
-  return sum / static_cast<double>(lag_s.size());
+/// Of all chambers. @param left_out_s for lags that are not configured
+FillVentLag mean_lag(const ActuatorInverseSettings& inverse, int chambers, double left_out_s) {
+  FillVentLag sum;
+  for (int j = 0; j < chambers; ++j) {
+    const FillVentLag lag = inverse.lag(static_cast<std::size_t>(j), left_out_s);
+    sum.fill_s += lag.fill_s;
+    sum.vent_s += lag.vent_s;
+  }
+  return {sum.fill_s / chambers, sum.vent_s / chambers};
 }
 
 }  // namespace
@@ -183,8 +186,9 @@ Experiment on_declared_arm(Experiment e) {
   plant.valves.dead_time_s = e.control.dead_time_s;
   const ActuatorInverseSettings& inverse = e.actuator_inverse;
   if (inverse.lags()) {
-    plant.valves.lag_s = mean_lag_s(inverse.fill_lag_s, e.control.valve_lag_s);
-    plant.valves.vent_lag_s = mean_lag_s(inverse.vent_lag_s, e.control.valve_lag_s);
+    const FillVentLag lag = mean_lag(inverse, chamber_count(e.actuation), e.control.valve_lag_s);
+    plant.valves.lag_s = lag.fill_s;
+    plant.valves.vent_lag_s = lag.vent_s;
   }
   plant.material.hysteresis = inverse.hysteresis;
   plant.material.play_bar = inverse.play_bar;

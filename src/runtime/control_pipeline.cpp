@@ -25,15 +25,13 @@ constexpr double kMostForce = 10.0;
 /// Pressures of an external law may be off the limits by rounding.
 constexpr double kPressureRounding = 1e-6;
 
-SegmentVector most_force_nm(const ActuationSettings& actuation) {
-  const double largest_bar =
-      std::max(std::abs(actuation.min_pressure_bar), std::abs(actuation.max_pressure_bar));
-  SegmentVector most(2 * std::ssize(actuation.segments));
-  for (Eigen::Index i = 0; i < most.size(); ++i) {
-    double gain = 0.0;
-    for (const Chamber& chamber : actuation.segments[static_cast<std::size_t>(i / 2)])
-      gain += chamber.gain_nm_per_bar;
-    most[i] = kMostForce * gain * largest_bar;
+SegmentVector most_force(const ArmParameters& arm, const ActuationSettings& actuation) {
+  const int width = arm.segment_dof();
+  SegmentVector most(arm.dof());
+  for (int i = 0; i < arm.size(); ++i) {
+    const LargestForce force = largest_force(actuation, static_cast<std::size_t>(i));
+    most.segment<2>(width * i).setConstant(kMostForce * force.moment_nm);
+    if (width == 3) most[width * i + 2] = kMostForce * force.axial_n;
   }
   return most;
 }
@@ -83,7 +81,7 @@ ControlPipeline::ControlPipeline(const PipelineSettings& settings)
       law_(settings.control.law.make(
           {settings.arm, settings.control, chamber_count(settings.actuation)})),
       external_(dynamic_cast<ExternalLawInput*>(law_.get())),
-      most_force_nm_(most_force_nm(settings.actuation)),
+      most_force_(most_force(settings.arm, settings.actuation)),
       allocator_(settings.actuation, settings.arm.extensible),
       inverse_(settings.actuator_inverse.any()
                    ? std::make_unique<ActuatorInverse>(
@@ -387,8 +385,8 @@ LawVerdict ControlPipeline::judge(const LawInput& law, std::int64_t now_ns) noex
     if (law.values.size() > 0 && (law.values.minCoeff() < actuation.min_pressure_bar - rounding ||
                                   law.values.maxCoeff() > actuation.max_pressure_bar + rounding))
       return LawVerdict::out_of_limits;
-  } else if (law.values.size() == most_force_nm_.size() &&
-             (law.values.array().abs() > most_force_nm_.array()).any()) {
+  } else if (law.values.size() == most_force_.size() &&
+             (law.values.array().abs() > most_force_.array()).any()) {
     return LawVerdict::out_of_limits;
   }
   const LawVerdict verdict = external_->take(law.answer, law.values);

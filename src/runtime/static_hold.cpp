@@ -11,13 +11,8 @@ namespace {
 
 double beyond_nm(const ActuationSettings& actuation) {
   double most = 1.0;
-  for (const auto& chambers : actuation.segments) {
-    double gain = 0.0;
-    for (const Chamber& chamber : chambers) gain += chamber.gain_nm_per_bar;
-    most = std::max(most, 2.0 * gain *
-                              std::max(std::abs(actuation.min_pressure_bar),
-                                       std::abs(actuation.max_pressure_bar)));
-  }
+  for (std::size_t i = 0; i < actuation.segments.size(); ++i)
+    most = std::max(most, 2.0 * largest_force(actuation, i).moment_nm);
   return most;
 }
 

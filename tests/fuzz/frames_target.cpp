@@ -13,7 +13,7 @@ namespace {
 
 constexpr unsigned kFrame = 1, kReference = 2, kMeasured = 4, kArm = 8, kDisarm = 16, kStop = 32;
 
-const Experiment& experiment() {
+const Experiment& frames_experiment() {
   static const Experiment loaded = [] {
     Experiment one = load_experiment(kConfigFolder / "one_segment.yaml");
     one.safety.good_frames = 2;
@@ -24,16 +24,16 @@ const Experiment& experiment() {
 
 /// ACTIVE, and about to bend.
 std::unique_ptr<PipelineBench> active_bench() {
-  auto bench = std::make_unique<PipelineBench>(experiment());
+  auto bench = std::make_unique<PipelineBench>(frames_experiment());
   require(bench->run_to(Mode::active) > 0, "the bench becomes ACTIVE");
   bench->run(5);
   return bench;
 }
 
 /// Numbers of any type, one after the other; zeros where the input has ended.
-class Source {
+class Numbers {
  public:
-  explicit Source(std::span<const std::byte> bytes) : left_(bytes) {}
+  explicit Numbers(std::span<const std::byte> bytes) : left_(bytes) {}
   bool empty() const { return left_.empty(); }
   template <class Number>
   Number take() {
@@ -59,24 +59,24 @@ void put(Number value, Bytes& bytes) {
   bytes.insert(bytes.end(), from, from + sizeof value);
 }
 
-MocapFrame take_frame(Source& source, ClockRelation& clock, std::int64_t now_ns) {
+MocapFrame take_frame(Numbers& numbers, ClockRelation& clock, std::int64_t now_ns) {
   MocapFrame frame;
-  frame.frame_number = source.take<std::int64_t>();
-  frame.capture_ns = clock.capture_ns(now_ns, source.take<std::int64_t>());
-  frame.segments = experiment().arm.size();
-  for (std::size_t i = 0; i <= experiment().arm.segments.size(); ++i) {
+  frame.frame_number = numbers.take<std::int64_t>();
+  frame.capture_ns = clock.capture_ns(now_ns, numbers.take<std::int64_t>());
+  frame.segments = frames_experiment().arm.size();
+  for (std::size_t i = 0; i <= frames_experiment().arm.segments.size(); ++i) {
     BodyPose& body = frame.body[i];
-    body.valid = (source.take<std::uint8_t>() & 1) != 0;
-    for (double& each : body.position_m) each = source.take<double>();
-    for (double& each : body.orientation.coeffs()) each = source.take<double>();
+    body.valid = (numbers.take<std::uint8_t>() & 1) != 0;
+    for (double& each : body.position_m) each = numbers.take<double>();
+    for (double& each : body.orientation.coeffs()) each = numbers.take<double>();
   }
   return frame;
 }
 
 void check(const PressureVector& before, const TickOutput& output) {
-  const ActuationSettings& limits = experiment().actuation;
-  const double step =
-      std::max(limits.slew_bar_per_s, limits.vent_bar_per_s) / experiment().rate_hz * (1.0 + 1e-9);
+  const ActuationSettings& limits = frames_experiment().actuation;
+  const double step = std::max(limits.slew_bar_per_s, limits.vent_bar_per_s) /
+                      frames_experiment().rate_hz * (1.0 + 1e-9);
   for (Eigen::Index j = 0; j < output.pressure_bar.size(); ++j) {
     const double bar = output.pressure_bar[j];
     require(bar >= 0.0 && bar <= limits.max_pressure_bar, "pressures stay within their limits");
@@ -90,10 +90,10 @@ void run_frames(std::span<const std::byte> input) {
   const auto made = active_bench();
   PipelineBench& bench = *made;
   ClockRelation clock(ClockMode::sender, 0.0);
-  Source source(input);
-  const int dof = experiment().arm.dof();
-  while (!source.empty()) {
-    const auto flags = source.take<std::uint8_t>();
+  Numbers numbers(input);
+  const int dof = frames_experiment().arm.dof();
+  while (!numbers.empty()) {
+    const auto flags = numbers.take<std::uint8_t>();
     bench.now_ns += bench.pipeline.period_ns();
     TickInput tick;
     tick.now_ns = bench.now_ns;
@@ -102,12 +102,12 @@ void run_frames(std::span<const std::byte> input) {
     tick.requests.emergency_stop = (flags & kStop) != 0;
     MocapFrame frame;
     if ((flags & kFrame) != 0) {
-      frame = take_frame(source, clock, bench.now_ns);
+      frame = take_frame(numbers, clock, bench.now_ns);
       tick.frames = {&frame, 1};
     }
     LiveReferenceInput reference;
     if ((flags & kReference) != 0) {
-      reference = {source.vector(dof), source.vector(dof), source.vector(dof)};
+      reference = {numbers.vector(dof), numbers.vector(dof), numbers.vector(dof)};
       tick.reference = &reference;
     }
     const PressureVector before = bench.pipeline.output().pressure_bar;
@@ -115,7 +115,7 @@ void run_frames(std::span<const std::byte> input) {
     if ((flags & kMeasured) != 0) {
       // DaemonLink lets nothing but finite ones through.
       for (double& each : measured) {
-        const float bar = source.take<float>();
+        const float bar = numbers.take<float>();
         each = std::isfinite(bar) ? static_cast<double>(bar) : 0.0;
       }
       tick.measured_bar = &measured;
@@ -137,13 +137,13 @@ std::vector<Bytes> frames_seeds() {
       const MocapFrame frame = bench.exact_frame();
       put(frame.frame_number, bytes);
       put(frame.capture_ns / 1000, bytes);
-      for (std::size_t i = 0; i <= experiment().arm.segments.size(); ++i) {
+      for (std::size_t i = 0; i <= frames_experiment().arm.segments.size(); ++i) {
         put(std::uint8_t{1}, bytes);
         for (const double each : frame.body[i].position_m) put(each, bytes);
         for (const double each : frame.body[i].orientation.coeffs()) put(each, bytes);
       }
       if (k % 4 != 3 || (more & kReference) == 0) continue;
-      for (int i = 0; i < 3 * experiment().arm.dof(); ++i) put(0.1, bytes);
+      for (int i = 0; i < 3 * frames_experiment().arm.dof(); ++i) put(0.1, bytes);
       for (int i = 0; i < static_cast<int>(bench.pipeline.output().pressure_bar.size()); ++i)
         put(0.5F, bytes);
     }

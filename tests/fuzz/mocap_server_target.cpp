@@ -2,8 +2,8 @@
 // within their bounds, and what they accept they send again.
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 
+#include "fuzz/same_body.hpp"
 #include "fuzz/target.hpp"
 #include "transport/natnet_packets.hpp"
 #include "transport/qtm_packets.hpp"
@@ -29,13 +29,6 @@ SentFrame two_bodies() {
   for (std::size_t k = 0; k < 2; ++k)
     frame.body[k] = {static_cast<std::int32_t>(k + 1), k == 0, {1, 2, 3}, {1, 0, 0, 0}};
   return frame;
-}
-
-/// Bit for bit: NaN is itself.
-bool same(const SentBody& a, const SentBody& b) {
-  return a.id == b.id && a.seen == b.seen &&
-         std::memcmp(a.position.data(), b.position.data(), sizeof a.position) == 0 &&
-         std::memcmp(a.orientation.data(), b.orientation.data(), sizeof a.orientation) == 0;
 }
 
 /// The same, where the orientation went through a matrix of floats.
@@ -75,7 +68,7 @@ void run_natnet(std::span<const std::byte> input) {
   const auto sent = natnet_contents(packet, NatnetMessage::frame);
   require(decode_natnet_frame(sent, dialect, again, news), "what was accepted can be sent");
   require(std::equal(frame.body.begin(), frame.body.begin() + frame.bodies, again.body.begin(),
-                     again.body.begin() + again.bodies, same),
+                     again.body.begin() + again.bodies, same_body),
           "what is sent again is the same");
   names().translate(frame);
 }

@@ -1,9 +1,9 @@
 // Every motion-capture source, by name: whatever the bytes, a format keeps within what it declares,
 // and what it accepts it can send again.
 #include <algorithm>
-#include <cstring>
 #include <memory>
 
+#include "fuzz/same_body.hpp"
 #include "fuzz/target.hpp"
 #include "softarm/transport/mocap_source.hpp"
 
@@ -38,13 +38,6 @@ std::vector<std::unique_ptr<Source>>& sources() {
   return all;
 }
 
-/// Bit for bit: NaN is itself. (qtm sends matrices: its target compares them.)
-bool same(const SentBody& a, const SentBody& b) {
-  return a.id == b.id && a.seen == b.seen &&
-         std::memcmp(a.position.data(), b.position.data(), sizeof a.position) == 0 &&
-         std::memcmp(a.orientation.data(), b.orientation.data(), sizeof a.orientation) == 0;
-}
-
 }  // namespace
 
 void run_mocap(std::span<const std::byte> input) {
@@ -64,9 +57,10 @@ void run_mocap(std::span<const std::byte> input) {
   if (!accepted) return;
   require(it.sent.bodies <= SentFrame::kMostBodies, "bodies stay within their capacity");
   require(it.format->decode(it.format->encode(it.sent), it.again), "what was accepted can be sent");
+  // qtm sends matrices: its target compares them.
   if (choice % sources().size() == mocap_sources().index("qtm")) return;
   require(std::equal(it.sent.body.begin(), it.sent.body.begin() + it.sent.bodies,
-                     it.again.body.begin(), it.again.body.begin() + it.again.bodies, same),
+                     it.again.body.begin(), it.again.body.begin() + it.again.bodies, same_body),
           "what is sent again is the same");
 }
 

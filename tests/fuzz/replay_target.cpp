@@ -13,7 +13,7 @@ namespace {
 
 constexpr std::size_t kDigest = 8;
 
-const Experiment& experiment() {
+const Experiment& replay_experiment() {
   static const Experiment loaded = load_experiment(kConfigFolder / "one_segment.yaml");
   return loaded;
 }
@@ -32,11 +32,11 @@ void put_digest(Bytes& record) {
 void run_replay(std::span<const std::byte> input) {
   std::istringstream stream(to_text(input));
   EventLogReader log(stream);
-  Replay replay(experiment(), "this build", true);
+  Replay replay(replay_experiment(), "this build", true);
   std::int64_t events = 0;
   Bytes record;
   for (LogEvent event; log.next(event); ++events) {
-    if (event.channel == experiment().transport.lcm.tick_channel) {
+    if (event.channel == replay_experiment().transport.lcm.tick_channel) {
       record = to_bytes(event.data);
       put_digest(record);
       event.data = record;
@@ -53,8 +53,9 @@ void run_replay(std::span<const std::byte> input) {
 
 std::vector<Bytes> replay_seeds() {
   LogBytes run, lossy;
-  record_run(experiment(), 0.01, false, run);
-  record_run(experiment(), 0.02, false, lossy, {[](auto tick, auto) { return tick % 3 != 0; }});
+  record_run(replay_experiment(), 0.01, false, run);
+  record_run(replay_experiment(), 0.02, false, lossy,
+             {[](auto tick, auto) { return tick % 3 != 0; }});
   return {to_bytes(run.bytes), to_bytes(lossy.bytes)};
 }
 

@@ -46,6 +46,10 @@ function(softarm_module name)
     PRIVATE ${MODULE_PRIVATE_DEPENDS} $<BUILD_INTERFACE:softarm_options>)
   set_property(GLOBAL APPEND PROPERTY SOFTARM_MODULES softarm_${name})
   softarm_precompile(module softarm_${name})
+  # Much of a file's compile time is headers, but for the recursions in model, which each use their namespace.
+  if(NOT name STREQUAL "model")
+    set_target_properties(softarm_${name} PROPERTIES UNITY_BUILD ${SOFTARM_PRECOMPILED_HEADERS} UNITY_BUILD_BATCH_SIZE 6)
+  endif()
 endfunction()
 
 # The program NAME from the sources in src/apps/NAME.

@@ -3,9 +3,12 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <optional>
 #include <vector>
+
+#include "softarm/actuation/fill_vent_lag.hpp"
 
 namespace softarm {
 
@@ -53,6 +56,14 @@ struct ActuatorInverseSettings {
   /// Springs beside K that slip at a bend, as SlipSpring; of every segment. Without stiffness: none.
   std::vector<double> slip_radius_rad = {0.0}, slip_stiffness_nm_per_rad = {0.0};
 
+  /// Of a chamber, counted from 0. @param left_out_s for each of its lags that is not here
+  FillVentLag lag(std::size_t chamber, double left_out_s) const {
+    const auto of = [&](const std::vector<double>& lag_s) {
+      const double own_s = lag_s.empty() ? 0.0 : lag_s.at(chamber);
+      return own_s > 0.0 ? own_s : left_out_s;
+    };
+    return {of(fill_lag_s), of(vent_lag_s)};
+  }
   bool lags() const { return positive(fill_lag_s) || positive(vent_lag_s); }
   bool slips() const { return positive(slip_stiffness_nm_per_rad); }
   bool any() const {
@@ -70,6 +81,23 @@ inline int chamber_count(const ActuationSettings& settings) {
   std::size_t count = 0;
   for (const auto& chambers : settings.segments) count += chambers.size();
   return static_cast<int>(count);
+}
+
+/// More than the chambers of a segment give within the limits: all act along one direction.
+struct LargestForce {
+  double moment_nm = 0.0;  ///< on u_x, u_y
+  double axial_n = 0.0;    ///< on e
+};
+
+inline LargestForce largest_force(const ActuationSettings& settings, std::size_t segment) {
+  LargestForce per_bar;
+  for (const Chamber& chamber : settings.segments[segment]) {
+    per_bar.moment_nm += chamber.gain_nm_per_bar;
+    per_bar.axial_n += chamber.gain_nm_per_bar / chamber.offset_m;
+  }
+  const double largest_bar =
+      std::max(std::abs(settings.min_pressure_bar), std::abs(settings.max_pressure_bar));
+  return {per_bar.moment_nm * largest_bar, per_bar.axial_n * largest_bar};
 }
 
 /// Turns settings for `segments` segments into actuation by torque within +-`max_torque_nm`.

@@ -205,8 +205,8 @@ class ControlPipeline {
   Reference reference_;
   std::unique_ptr<HoldLimits> hold_;
   std::unique_ptr<ControlLaw> law_;
-  ExternalLawInput* external_;   ///< the same law, where it is external
-  SegmentVector most_force_nm_;  ///< of an external law: more is no force of this arm
+  ExternalLawInput* external_;  ///< the same law, where it is external
+  SegmentVector most_force_;    ///< of an external law: more is no force of this arm
   PressureAllocator allocator_;
   std::unique_ptr<ActuatorInverse> inverse_;         ///< where it is configured
   std::unique_ptr<ElongationReference> elongation_;  ///< where segments stretch

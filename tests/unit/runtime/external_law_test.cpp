@@ -172,6 +172,19 @@ TEST(ExternalLaw, WhatCannotBeIsRefusedCountedAndNotCommanded) {
   refused(LawVerdict::not_recent, [&] { it.state_ns = it.bench->now_ns + 1000 * kMs; });
 }
 
+TEST(ExternalLaw, AlongAnArmThatStretchesForcesOutOfAllProportionAreRefused) {
+  Experiment experiment = load_experiment(SOFTARM_SOURCE_DIR "/config/paper_arm_stretching.yaml");
+  experiment.control.law = ExternalLaw{};
+  for (int row = 0; row < 3; ++row) {
+    ExternalLawBench it(experiment);
+    it.law.values = PressureVector::Zero(9);
+    it.law.values[3 + row] = row < 2 ? 1e3 : 1e5;  // N m; N
+    it.run(300);
+    EXPECT_EQ(it.count(LawVerdict::out_of_limits), it.sent) << row;
+    EXPECT_GT(it.sent, 0);
+  }
+}
+
 /// A force out of reach is no fault of the law: it is scaled as that of (17) is.
 TEST(ExternalLaw, ForceOutOfReachIsScaled) {
   ExternalLawBench it;
