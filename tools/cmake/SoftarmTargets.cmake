@@ -52,23 +52,27 @@ function(softarm_module name)
   endif()
 endfunction()
 
+# For tests, and programs that parse, call and print: the modules that they call are optimised in full, they are not, and several
+# files are compiled as one.
+function(softarm_optimise_less)
+  set_target_properties(${ARGN} PROPERTIES UNITY_BUILD ${SOFTARM_PRECOMPILED_HEADERS} UNITY_BUILD_BATCH_SIZE 8)
+  if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+    foreach(target IN LISTS ARGN)
+      # At -O1 g++ 12 reports false positives in Eigen and std::string; in tests the sanitizers look for them.
+      target_compile_options(${target} PRIVATE $<$<NOT:$<CONFIG:Debug>>:-O1 -Wno-maybe-uninitialized -Wno-array-bounds -Wno-stringop-overflow>)
+    endforeach()
+  endif()
+endfunction()
+
 # The program NAME from the sources in src/apps/NAME.
 function(softarm_program name)
   cmake_parse_arguments(PROGRAM "" "" "DEPENDS" ${ARGN})
   file(GLOB_RECURSE sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/${name}/*.cpp)
   add_executable(${name} ${sources})
   target_link_libraries(${name} PRIVATE softarm_program_frame ${PROGRAM_DEPENDS} softarm_options)
+  softarm_optimise_less(${name})
   softarm_precompile(program ${name})
   install(TARGETS ${name} RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
-endfunction()
-
-# Only what is tested is optimised in full, and several files are compiled as one: a third of the tests' compile time.
-function(softarm_optimise_test target)
-  set_target_properties(${target} PROPERTIES UNITY_BUILD ${SOFTARM_PRECOMPILED_HEADERS} UNITY_BUILD_BATCH_SIZE 8)
-  if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
-    # At -O1 g++ 12 reports false positives in Eigen and std::string; in tests the sanitizers look for them.
-    target_compile_options(${target} PRIVATE $<$<NOT:$<CONFIG:Debug>>:-O1 -Wno-maybe-uninitialized -Wno-array-bounds -Wno-stringop-overflow>)
-  endif()
 endfunction()
 
 function(softarm_tests label module)
@@ -83,7 +87,7 @@ function(softarm_tests label module)
   target_link_libraries(${target} PRIVATE ${TESTS_DEPENDS} GTest::gtest_main softarm_options)
   target_compile_definitions(${target} PRIVATE
     SOFTARM_SOURCE_DIR="${PROJECT_SOURCE_DIR}" SOFTARM_BINARY_DIR="${PROJECT_BINARY_DIR}")
-  softarm_optimise_test(${target})
+  softarm_optimise_less(${target})
   softarm_precompile(test ${target})
   set(usual "*")
   set(lock "")
