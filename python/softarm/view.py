@@ -43,18 +43,19 @@ class Picture:
         return 1e3 * float(np.max(np.abs(self.u_ref - self.u)))
 
 
-def live_pictures(client, step=lambda may_fill: None):
+def live_pictures(client, step=None):
     """Pictures of a running arm every FRAME_S, of a simulated one also without a daemon; None where all is silent for a second.
 
-    Meanwhile it calls `step` at least every 5 ms: whether the arm is simulated and no daemon reports.
+    Meanwhile it calls `step`, if there is one, at least every 5 ms: whether the arm is simulated and no daemon reports.
     """
     start_us = None
     tick, heard, plant_us, moved = -1, time.monotonic(), -1, -1e9
     while True:
         end, new = time.monotonic() + FRAME_S, False
         while (left := end - time.monotonic()) > 0.0:
-            client.update(min(left, 0.005))
-            step(end - heard > SILENT_S and end - moved < SILENT_S)
+            client.update(min(left, 0.005) if step else left)
+            if step:
+                step(end - heard > SILENT_S and end - moved < SILENT_S)
         status, plant, now = client.status, client.plant, time.monotonic()
         if status is not None and status.tick != tick:
             tick, heard, new = status.tick, now, True
@@ -310,7 +311,7 @@ def main(config, log, host, port, control):
             play(view, pictures)
         pending = view.add_control(client) if control else tuple
         hand = view.add_hand(experiment) if control else None
-        for picture in live_pictures(client, hand.step if hand else lambda may_fill: None):
+        for picture in live_pictures(client, hand.step if hand else None):
             for request in pending():
                 view.say(f"{request}: {client.request(request)}")
             if picture is None:

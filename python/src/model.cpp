@@ -4,7 +4,7 @@
 #include <memory>
 #include <vector>
 
-#include "arm.hpp"
+#include "row_method.hpp"
 #include "softarm/model/actuation_matrix.hpp"
 #include "softarm/model/arm.hpp"
 #include "softarm/model/dynamics.hpp"
@@ -113,10 +113,21 @@ VectorXd column_of(const Arm& arm, double SegmentParameters::*member) {
   return values;
 }
 
+bool forward_rows(Arm& arm, const std::array<Vector, 3>& rows, VectorRef out) {
+  return forward_dynamics(arm.parameters, arm.workspace, rows[0], rows[1], rows[2], out);
+}
+
+bool inverse_rows(Arm& arm, const std::array<Vector, 3>& rows, VectorRef out) {
+  const auto& [u, velocity, acceleration] = rows;
+  inverse_dynamics(arm.parameters, arm.workspace, u, velocity, velocity, acceleration, {}, out);
+  add_impedance(arm.parameters, u, velocity, out);
+  return true;
+}
+
 py::object forward(Arm& arm, const Vector& u, const Vector& velocity, const Vector& force) {
   Result acceleration(arm.parameters.dof());
-  if (!forward_dynamics(arm.parameters, arm.workspace, arm.u(u), arm.u(velocity, "velocity"),
-                        arm.u(force, "generalized_force_nm"), acceleration.vector)) {
+  arm.u(u), arm.u(velocity, "velocity"), arm.u(force, "generalized_force_nm");
+  if (!forward_rows(arm, {u, velocity, force}, acceleration.vector)) {
     throw std::domain_error("the inertia matrix is not positive definite in double precision");
   }
   return acceleration.array;
@@ -124,10 +135,8 @@ py::object forward(Arm& arm, const Vector& u, const Vector& velocity, const Vect
 
 py::object inverse(Arm& arm, const Vector& u, const Vector& velocity, const Vector& acceleration) {
   Result out(arm.parameters.dof());
-  arm.u(velocity, "velocity");
-  inverse_dynamics(arm.parameters, arm.workspace, arm.u(u), velocity, velocity,
-                   arm.u(acceleration, "acceleration"), {}, out.vector);
-  add_impedance(arm.parameters, u, velocity, out.vector);
+  arm.u(u), arm.u(velocity, "velocity"), arm.u(acceleration, "acceleration");
+  inverse_rows(arm, {u, velocity, acceleration}, out.vector);
   return out.array;
 }
 
@@ -256,6 +265,8 @@ void bind_dynamics(py::class_<Arm>& type) {
             return out;
           },
           py::arg("u"), py::arg("force_n"), "J' f of a force on the tip (N, world), (2n,), N m.");
+  RowMethod<3, forward_rows>::shorten(type, "forward_dynamics");
+  RowMethod<3, inverse_rows>::shorten(type, "inverse_dynamics");
 }
 
 }  // namespace

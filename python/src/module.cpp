@@ -10,6 +10,21 @@
 
 namespace softarm::python {
 
+bool Vector::look_at(py::handle source) noexcept {
+  static PyObject* const kDouble = py::dtype::of<double>().release().ptr();
+  const auto& numpy = py::detail::npy_api::get();
+  constexpr int kReadable =
+      py::detail::npy_api::NPY_ARRAY_ALIGNED_ | py::detail::npy_api::NPY_ARRAY_C_CONTIGUOUS_;
+  if (!numpy.PyArray_Check_(source.ptr())) return false;
+  const py::detail::PyArray_Proxy& array = *py::detail::array_proxy(source.ptr());
+  if (array.nd != 1 || array.descr != kDouble || (array.flags & kReadable) != kReadable) {
+    return false;
+  }
+  const void* const data = array.data;
+  new (this) Vector(static_cast<const double*>(data), array.dimensions[0]);
+  return true;
+}
+
 Result::Result(Eigen::Index size) : vector(nullptr, size) {
   static PyObject* const kDouble = py::dtype::of<double>().release().ptr();
   const auto& numpy = py::detail::npy_api::get();
@@ -65,23 +80,13 @@ void translate_config_error(std::exception_ptr pointer) {
 }  // namespace softarm::python
 
 bool pybind11::detail::type_caster<softarm::python::Vector>::load(handle source, bool convert) {
-  static PyObject* const kDouble = dtype::of<double>().release().ptr();
-  const auto look_at = [this](PyObject* array, ssize_t size) {
-    const void* const data = array_proxy(array)->data;
-    new (&value) softarm::python::Vector(static_cast<const double*>(data), size);
-    return true;
-  };
-  if (npy_api::get().PyArray_Check_(source.ptr())) {
-    const PyArray_Proxy& array = *array_proxy(source.ptr());
-    constexpr int kReadable = npy_api::NPY_ARRAY_ALIGNED_ | npy_api::NPY_ARRAY_C_CONTIGUOUS_;
-    if (array.nd == 1 && array.descr == kDouble && (array.flags & kReadable) == kReadable)
-      return look_at(source.ptr(), array.dimensions[0]);
-  }
+  if (value.look_at(source)) return true;
   if (!convert) return false;
   const auto array = array_t<double, array::c_style | array::forcecast>::ensure(source);
   if (!array || !(array.ndim() == 1 || (array.ndim() == 2 && array.shape(1) == 1))) return false;
   converted_ = array;
-  return look_at(array.ptr(), array.size());
+  new (&value) softarm::python::Vector(array.data(), array.size());
+  return true;
 }
 
 PYBIND11_MODULE(_core, module) {

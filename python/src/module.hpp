@@ -29,6 +29,8 @@ class Vector : public Eigen::Map<const Eigen::VectorXd> {
  public:
   Vector() noexcept : Map(nullptr, 0) {}
   Vector(const double* data, Eigen::Index size) noexcept : Map(data, size) {}
+  /// Looks at the memory of one row of doubles; false, and unchanged, where it is anything else.
+  bool look_at(py::handle source) noexcept;
 };
 
 /// A vector result, written where numpy will read it.

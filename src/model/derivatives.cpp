@@ -189,16 +189,14 @@ struct ModelDerivatives::Storage {
                  &SegmentParameters::axial_stiffness_n_per_m, out);
   }
 
-  /// B^-1 of the factor L that `solve_inertia` left, from L^-1; zero where lengths are held.
+  /// B^-1 of the matrix that was solved last; zero where lengths are held.
   void invert_inertia(MatrixRef& out) noexcept {
-    const DynamicsWorkspace::Storage& solved = workspace.storage();
-    B.setZero();
-    B.diagonal() = solved.scale;
-    solved.factor.triangularView<Eigen::Lower>().solveInPlace(B);
+    inverse_of_last_inertia(workspace, out);
     for (int i = 0; arm.extensible && i < arm.size(); ++i) {
-      if (arm.segments[static_cast<std::size_t>(i)].constant_length) B.col(3 * i + 2).setZero();
+      if (!arm.segments[static_cast<std::size_t>(i)].constant_length) continue;
+      out.row(3 * i + 2).setZero();
+      out.col(3 * i + 2).setZero();
     }
-    out.noalias() = B.transpose() * B;
   }
 
   void add_diagonal(double SegmentParameters::*bent, double SegmentParameters::*stretched,

@@ -14,7 +14,7 @@ DynamicsWorkspace::Storage::Storage(const ArmParameters& arm)
       extensible(arm.extensible ? arm.segments.size() : 0),
       zeros(Eigen::VectorXd::Zero(arm.dof())),
       bias(arm.dof()),
-      scale(arm.dof()),
+      inverse_pivots(arm.dof()),
       rhs(arm.dof()),
       solution(arm.dof()),
       residual(arm.dof()),
@@ -33,34 +33,117 @@ DynamicsWorkspace& DynamicsWorkspace::operator=(DynamicsWorkspace&&) noexcept = 
 
 namespace {
 
-/// L L' = A in the lower triangle of A, in place. False where a pivot is not positive (a NaN is
-/// not).
-bool cholesky(Eigen::Ref<Eigen::MatrixXd> A) noexcept {
-  const Eigen::Index n = A.rows();
+/// L D L' = A, in place: L below the diagonal (where it is 1), 1 / D in `inverse`. The upper
+/// triangle stays. False where a pivot is not positive (a NaN is not).
+///
+/// Nothing is scaled: without a choice of pivots an entry's rounding is relative to
+/// sqrt(a_ii a_jj) whatever the units of its rows, so segments of very different mass, or polar's
+/// theta^2 rows, do not decide it (Demmel, LAPACK working note 14, 1989).
+template <int kSize>
+bool factorize(Eigen::Index size, double* __restrict a, double* __restrict inverse) noexcept {
+  const Eigen::Index n = kSize > 0 ? kSize : size;
+#pragma GCC unroll 9
   for (Eigen::Index j = 0; j < n; ++j) {
-    for (Eigen::Index k = 0; k < j; ++k) {
-      const double factor = A(j, k);
-      for (Eigen::Index i = j; i < n; ++i) A(i, j) -= A(i, k) * factor;
+    const double pivot = a[j + j * n];
+    if (!(pivot > 0.0) || !std::isfinite(pivot)) return false;
+    const double inverse_pivot = inverse[j] = 1.0 / pivot;
+#pragma GCC unroll 9
+    for (Eigen::Index k = j + 1; k < n; ++k) {
+      const double factor = a[k + j * n] * inverse_pivot;
+#pragma GCC unroll 9
+      for (Eigen::Index i = k; i < n; ++i) a[i + k * n] -= a[i + j * n] * factor;
     }
-    if (!(A(j, j) > 0.0) || !std::isfinite(A(j, j))) return false;
-    const double pivot = std::sqrt(A(j, j));
-    for (Eigen::Index i = j; i < n; ++i) A(i, j) /= pivot;
+#pragma GCC unroll 9
+    for (Eigen::Index i = j + 1; i < n; ++i) a[i + j * n] *= inverse_pivot;
   }
   return true;
 }
 
-/// x := (L L')^-1 x.
-void substitute(const Eigen::Ref<const Eigen::MatrixXd>& L,
-                Eigen::Ref<Eigen::VectorXd> x) noexcept {
-  const Eigen::Index n = L.rows();
+/// x := (L D L')^-1 x.
+template <int kSize>
+void substitute(Eigen::Index size, const double* __restrict l, const double* __restrict inverse,
+                double* __restrict x) noexcept {
+  const Eigen::Index n = kSize > 0 ? kSize : size;
+#pragma GCC unroll 9
   for (Eigen::Index j = 0; j < n; ++j) {
-    x(j) /= L(j, j);
-    for (Eigen::Index i = j + 1; i < n; ++i) x(i) -= L(i, j) * x(j);
+    const double known = x[j];
+#pragma GCC unroll 9
+    for (Eigen::Index i = j + 1; i < n; ++i) x[i] -= l[i + j * n] * known;
   }
+#pragma GCC unroll 9
   for (Eigen::Index j = n - 1; j >= 0; --j) {
-    for (Eigen::Index i = j + 1; i < n; ++i) x(j) -= L(i, j) * x(i);
-    x(j) /= L(j, j);
+    double sum = x[j] * inverse[j];
+#pragma GCC unroll 9
+    for (Eigen::Index i = j + 1; i < n; ++i) sum -= l[i + j * n] * x[i];
+    x[j] = sum;
   }
+}
+
+/// out = (L D L')^-1 from V = L^-T, both without a sum over a row: what is added to stands side by side.
+template <int kSize>
+void invert(Eigen::Index size, const double* __restrict l, const double* __restrict inverse,
+            double* __restrict v, double* __restrict out, Eigen::Index stride) noexcept {
+  const Eigen::Index n = kSize > 0 ? kSize : size;
+#pragma GCC unroll 9
+  for (Eigen::Index i = 0; i < n; ++i) {
+    for (Eigen::Index j = 0; j < n; ++j) out[j + i * stride] = v[j + i * n] = 0.0;
+    v[i + i * n] = 1.0;
+#pragma GCC unroll 9
+    for (Eigen::Index k = 0; k < i; ++k) {
+      const double factor = l[i + k * n];
+#pragma GCC unroll 9
+      for (Eigen::Index j = 0; j <= k; ++j) v[j + i * n] -= v[j + k * n] * factor;
+    }
+  }
+#pragma GCC unroll 9
+  for (Eigen::Index k = 0; k < n; ++k) {
+#pragma GCC unroll 9
+    for (Eigen::Index j = 0; j <= k; ++j) {
+      const double factor = v[j + k * n] * inverse[k];
+#pragma GCC unroll 9
+      for (Eigen::Index i = 0; i <= j; ++i) out[i + j * stride] += v[i + k * n] * factor;
+    }
+  }
+  for (Eigen::Index j = 0; j < n; ++j) {
+    for (Eigen::Index i = 0; i < j; ++i) out[j + i * stride] = out[i + j * stride];
+  }
+}
+
+/// s.solution + s.residual is B^-1 rhs.
+template <int kSize>
+bool solve(const Eigen::Ref<const Eigen::MatrixXd>& B, ConstVectorRef rhs,
+           DynamicsWorkspace::Storage& s) noexcept {
+  const Eigen::Index n = kSize > 0 ? kSize : B.rows();
+  double *const factor = s.factor.data(), *const inverse = s.inverse_pivots.data();
+  double *const x = s.solution.data(), *const residual = s.residual.data();
+  const double *const b = B.data(), *const right = rhs.data();
+  const Eigen::Index stride = B.outerStride();
+  for (Eigen::Index j = 0; j < n; ++j) {
+#pragma GCC unroll 9
+    for (Eigen::Index i = 0; i < n; ++i) factor[i + j * n] = b[i + j * stride];
+    x[j] = right[j];
+  }
+  if (!factorize<kSize>(n, factor, inverse)) return false;
+  substitute<kSize>(n, factor, inverse, x);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    long double sum = right[i];
+#pragma GCC unroll 9
+    for (Eigen::Index j = 0; j < n; ++j) sum -= static_cast<long double>(b[j + i * stride]) * x[j];
+    residual[i] = static_cast<double>(sum);
+  }
+  substitute<kSize>(n, factor, inverse, residual);
+  return true;
+}
+
+/// Sizes that the compiler knows take half of the time.
+constexpr int kTwoSegments = 4, kThreeSegments = 6, kThreeThatStretch = 9;
+template <class Function>
+Function* of_size(Eigen::Index n, Function* two, Function* three, Function* stretch,
+                  Function* any) noexcept {
+  return n == kThreeSegments      ? three
+         : n == kTwoSegments      ? two
+         : n == kThreeThatStretch ? stretch
+                                  : any;
 }
 
 }  // namespace
@@ -80,39 +163,33 @@ void hold_constant_lengths(const ArmParameters& arm, Eigen::Ref<Eigen::MatrixXd>
 bool solve_inertia(DynamicsWorkspace& workspace, const Eigen::Ref<const Eigen::MatrixXd>& B,
                    ConstVectorRef rhs, VectorRef x) noexcept {
   auto& s = workspace.storage();
-  const Eigen::Index n = B.rows();
-  // Unit diagonal: segments of very different mass, or polar's theta^2 rows, must not decide the
-  // rounding.
-  for (Eigen::Index i = 0; i < n; ++i) s.scale(i) = 1.0 / std::sqrt(B(i, i));
-  for (Eigen::Index j = 0; j < n; ++j) {
-    for (Eigen::Index i = 0; i < n; ++i) s.factor(i, j) = B(i, j) * s.scale(i) * s.scale(j);
-    s.rhs(j) = rhs(j) * s.scale(j);
-    s.solution(j) = s.rhs(j);
-  }
-  if (!cholesky(s.factor)) {
+  const auto run = of_size(B.rows(), solve<kTwoSegments>, solve<kThreeSegments>,
+                           solve<kThreeThatStretch>, solve<0>);
+  if (!run(B, rhs, s)) {
     x.setConstant(std::numeric_limits<double>::quiet_NaN());
     return false;
   }
-  substitute(s.factor, s.solution);
-  for (Eigen::Index i = 0; i < n; ++i) {
-    long double sum = s.rhs(i);
-    for (Eigen::Index j = 0; j < n; ++j) {
-      sum -= static_cast<long double>(B(i, j) * s.scale(i) * s.scale(j)) * s.solution(j);
-    }
-    s.residual(i) = static_cast<double>(sum);
-  }
-  substitute(s.factor, s.residual);
-  for (Eigen::Index i = 0; i < n; ++i) x(i) = (s.solution(i) + s.residual(i)) * s.scale(i);
+  x = s.solution + s.residual;
   return true;
+}
+
+void inverse_of_last_inertia(DynamicsWorkspace& workspace,
+                             Eigen::Ref<Eigen::MatrixXd> out) noexcept {
+  auto& s = workspace.storage();
+  const auto run = of_size(out.rows(), invert<kTwoSegments>, invert<kThreeSegments>,
+                           invert<kThreeThatStretch>, invert<0>);
+  run(out.rows(), s.factor.data(), s.inverse_pivots.data(), s.B.data(), out.data(),
+      out.outerStride());
 }
 
 bool forward_dynamics(const ArmParameters& arm, DynamicsWorkspace& workspace, ConstVectorRef u,
                       ConstVectorRef velocity, ConstVectorRef generalized_force,
                       VectorRef acceleration) noexcept {
   auto& s = workspace.storage();
-  inertia_matrix(arm, workspace, u, s.B);
+  if (arm.is_thick()) inertia_matrix(arm, workspace, u, s.B);
   inverse_dynamics(arm, workspace, u, velocity, velocity, s.zeros,
                    {.inertia = false, .coriolis = true, .gravity = true}, s.bias);
+  if (!arm.is_thick()) inertia_of_last_shape(arm, workspace, s.B);
   add_impedance(arm, u, velocity, s.bias);
   s.bias = generalized_force - s.bias;
   if (arm.extensible) hold_constant_lengths(arm, s.B, s.bias);

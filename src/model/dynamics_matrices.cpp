@@ -150,6 +150,33 @@ void load_polar(const ArmParameters& arm, int begin, const double* q, const doub
   load_u<kArc>(arm, begin, u, u_rate, out);
 }
 
+/// Columns of the segment in this lane; without kRates only what B needs.
+template <bool kArc, bool kRates, bool kExtensible>
+[[gnu::always_inline]] inline void set_columns(const ShapeLanes& lanes, int l,
+                                               const SegmentState<kExtensible>& own,
+                                               SegmentColumns<kExtensible>& k) noexcept {
+  const Curve centre = lane(lanes.centre, l);
+  const Spin rotation = lane(lanes.turn_rate, l);
+  k.turn = turn(lanes, l);
+  k.mass = lanes.mass[l];
+  const auto end = point_motion(lane(lanes.tip, l), own);
+  k.tip = end.place;
+  k.translation = end.J;
+  const PairVector3 spins = columns(rotation, own.ux, own.uy);
+  k.rotation = without_elongation<kExtensible>(spins);
+  if constexpr (kRates) {
+    k.tip_rate = end.rate;
+    k.translation_rate = end.J_rate;
+    k.rotation_rate = without_elongation<kExtensible>(
+        column_rates(rotation, own.ux, own.uy, own.v) + cross(own.spin, spins));
+  }
+  if constexpr (kArc) {
+    k.own = arc_columns<kRates>(k.mass, own, centre, lane(lanes.arc, l));
+  } else {
+    k.own = point_columns<kRates>(k.mass, own, centre);
+  }
+}
+
 template <MassModel kMass, Coordinates kCoords>
 void outward(const ArmParameters& arm, const State& state,
              SegmentColumns<kCoords == Coordinates::ue>* out, Vector3 gravity) noexcept {
@@ -170,31 +197,14 @@ void outward(const ArmParameters& arm, const State& state,
       }
     }
     const double ux = lanes.ux[l], uy = lanes.uy[l];
-    const Curve tip = lane(lanes.tip, l), centre = lane(lanes.centre, l);
-    const Spin rotation = lane(lanes.turn_rate, l);
     const Direction v = lane(states.velocity, l);
     SegmentState<kExtensible> own{ux, uy, v, spin_of_frame, {}};
     if constexpr (kExtensible) own.stretch = {states.strain_rate[l], states.inverse_length[l]};
     SegmentColumns<kExtensible>& k = out[i];
-    k.turn = turn(lanes, l);
+    set_columns<kArc, true>(lanes, l, own, k);
     k.gravity = gravity;
-    const auto end = point_motion(tip, own);
-    k.tip = end.place;
-    k.tip_rate = end.rate;
-    k.translation = end.J;
-    k.translation_rate = end.J_rate;
-    const PairVector3 spins = columns(rotation, ux, uy);
-    k.rotation = without_elongation<kExtensible>(spins);
-    k.rotation_rate = without_elongation<kExtensible>(column_rates(rotation, ux, uy, v) +
-                                                      cross(spin_of_frame, spins));
-    k.mass = lanes.mass[l];
-    if constexpr (kArc) {
-      k.own = arc_columns(k.mass, own, centre, lane(lanes.arc, l));
-    } else {
-      k.own = point_columns(k.mass, own, centre);
-    }
     if constexpr (kPolar) states.polar[static_cast<std::size_t>(l)].apply(k);
-    spin_of_frame = rotate_back(k.turn, spin_of_frame + first(rotation, ux, uy, v));
+    spin_of_frame = rotate_back(k.turn, spin_of_frame + first(lane(lanes.turn_rate, l), ux, uy, v));
     gravity = rotate_back(k.turn, gravity);
   }
 }
@@ -274,8 +284,10 @@ void inward(int n, const SegmentColumns<kExtensible>* segments, const Output& B,
       m.L_rate += k.own.angular_rate;
       m.flow += k.own.flow;
     }
-    const auto weight = dot(k.gravity, m.P);
-    for (int a = 0; a < kWidth; ++a) G[kWidth * j + a] = -weight[a];
+    if constexpr (kCoriolis) {
+      const auto weight = dot(k.gravity, m.P);
+      for (int a = 0; a < kWidth; ++a) G[kWidth * j + a] = -weight[a];
+    }
     for (int i = j - 1; i >= 0; --i) {
       const SegmentColumns<kExtensible>& ancestor = segments[i];
       m.template rotate_by<kCoriolis>(ancestor.turn);
@@ -287,15 +299,53 @@ void inward(int n, const SegmentColumns<kExtensible>* segments, const Output& B,
   }
 }
 
-/// Both passes: B and G, and C where it is wanted. Without, C is not touched.
-template <Coordinates kCoords, bool kCoriolis>
+template <Coordinates kCoords>
 void evaluate(const ArmParameters& arm, DynamicsWorkspace& workspace, const State& state,
               const Output& B, const Output& C, double* G) noexcept {
   auto* segments = workspace.storage().of<kCoords == Coordinates::ue>().columns.data();
   const auto run = arm.mass == MassModel::point ? outward<MassModel::point, kCoords>
                                                 : outward<MassModel::distributed, kCoords>;
   run(arm, state, segments, from_eigen(arm.base_rotation.transpose() * arm.gravity_mps2));
-  inward<kCoriolis>(arm.size(), segments, B, C, G);
+  inward<true>(arm.size(), segments, B, C, G);
+}
+
+/// B alone, of the shape in the workspace.
+template <bool kArc, bool kExtensible>
+void evaluate_inertia(const ArmParameters& arm, SegmentStorage<kExtensible>& s,
+                      const Output& B) noexcept {
+  for (int i = 0; i < arm.size(); ++i) {
+    const auto& lanes = s.lanes[group_of(i)];
+    const int l = lane_of(i);
+    SegmentState<kExtensible> own{lanes.ux[l], lanes.uy[l], {}, {}, {}};
+    if constexpr (kExtensible) own.stretch = {0.0, lanes.inverse_length[l]};
+    set_columns<kArc, false>(lanes, l, own, s.columns[static_cast<std::size_t>(i)]);
+  }
+  inward<false>(arm.size(), s.columns.data(), B, B, nullptr);
+}
+
+template <bool kArc, bool kExtensible>
+void load_shapes(const ArmParameters& arm, const double* u, SegmentStorage<kExtensible>& s) {
+  for (int i = 0; i < arm.size(); i += kLanes) load_shape<kArc>(arm, i, u, s.lanes[group_of(i)]);
+}
+
+/// B at u, or of the last shape where there is none.
+template <bool kExtensible>
+void inertia(const ArmParameters& arm, SegmentStorage<kExtensible>& s, const double* u,
+             const Output& B) noexcept {
+  if (arm.mass == MassModel::point) {
+    if (u != nullptr) load_shapes<false>(arm, u, s);
+    evaluate_inertia<false>(arm, s, B);
+  } else {
+    if (u != nullptr) load_shapes<true>(arm, u, s);
+    evaluate_inertia<true>(arm, s, B);
+  }
+}
+
+void inertia(const ArmParameters& arm, DynamicsWorkspace::Storage& s, const double* u,
+             Eigen::Ref<Eigen::MatrixXd>& B) noexcept {
+  const Output out{B.data(), B.outerStride()};
+  if (arm.extensible) return inertia(arm, s.extensible, u, out);
+  inertia(arm, s.inextensible, u, out);
 }
 
 /// A thick arm's columns come from the recursion, which knows rotary inertia: B e_j and C(u, u')
@@ -334,8 +384,7 @@ void fill_with_nan(Eigen::Ref<Eigen::MatrixXd>& B, Eigen::Ref<Eigen::MatrixXd>& 
 void dynamics_matrices(const ArmParameters& arm, DynamicsWorkspace& workspace, ConstVectorRef u,
                        ConstVectorRef velocity, Eigen::Ref<Eigen::MatrixXd> B,
                        Eigen::Ref<Eigen::MatrixXd> C, VectorRef G) noexcept {
-  const auto run =
-      arm.extensible ? evaluate<Coordinates::ue, true> : evaluate<Coordinates::u, true>;
+  const auto run = arm.extensible ? evaluate<Coordinates::ue> : evaluate<Coordinates::u>;
   run(arm, workspace, {u.data(), velocity.data()}, {B.data(), B.outerStride()},
       {C.data(), C.outerStride()}, G.data());
   if (arm.is_thick()) columns_of_recursion(arm, workspace, u, velocity, B, &C);
@@ -353,19 +402,20 @@ void polar_dynamics_matrices(const ArmParameters& arm, DynamicsWorkspace& worksp
     dynamics_matrices(arm, workspace, s.residual, s.bias, B, C, G);
     return dynamics_to_polar(q, velocity, B, C, G);
   }
-  evaluate<Coordinates::polar, true>(arm, workspace, {q.data(), velocity.data()},
-                                     {B.data(), B.outerStride()}, {C.data(), C.outerStride()},
-                                     G.data());
+  evaluate<Coordinates::polar>(arm, workspace, {q.data(), velocity.data()},
+                               {B.data(), B.outerStride()}, {C.data(), C.outerStride()}, G.data());
 }
 
 void inertia_matrix(const ArmParameters& arm, DynamicsWorkspace& workspace, ConstVectorRef u,
                     Eigen::Ref<Eigen::MatrixXd> B) noexcept {
   auto& s = workspace.storage();
   if (arm.is_thick()) return columns_of_recursion(arm, workspace, u, s.zeros, B, nullptr);
-  const auto run =
-      arm.extensible ? evaluate<Coordinates::ue, false> : evaluate<Coordinates::u, false>;
-  const Output out{B.data(), B.outerStride()};
-  run(arm, workspace, {u.data(), s.zeros.data()}, out, out, s.residual.data());
+  inertia(arm, s, u.data(), B);
+}
+
+void inertia_of_last_shape(const ArmParameters& arm, DynamicsWorkspace& workspace,
+                           Eigen::Ref<Eigen::MatrixXd> B) noexcept {
+  inertia(arm, workspace.storage(), nullptr, B);
 }
 
 }  // namespace softarm

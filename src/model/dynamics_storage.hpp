@@ -66,8 +66,17 @@ struct DynamicsWorkspace::Storage {
 
   SegmentStorage<false> inextensible;  ///< one of the two is empty
   SegmentStorage<true> extensible;
-  Eigen::VectorXd zeros, bias, scale, rhs, solution, residual;
+  Eigen::VectorXd zeros, bias, inverse_pivots, rhs, solution, residual;
   Eigen::MatrixXd B, factor;
 };
+
+/// B of the shape that the last `inverse_dynamics` with Coriolis terms on this workspace left; not
+/// of a thick arm.
+void inertia_of_last_shape(const ArmParameters& arm, DynamicsWorkspace& workspace,
+                           Eigen::Ref<Eigen::MatrixXd> B) noexcept;
+
+/// The inverse of the matrix of the last `solve_inertia`; overwrites the workspace's B.
+void inverse_of_last_inertia(DynamicsWorkspace& workspace,
+                             Eigen::Ref<Eigen::MatrixXd> out) noexcept;
 
 }  // namespace softarm

@@ -70,13 +70,16 @@ struct ArcColumnTerms {
   }
 
   /// int {y, y'} y_i: second moment and, from it, spin and bending.
+  template <bool kRates>
   PairVector3 second_row(const Vector3& W, double on_v, double on_u, double on_z) const noexcept {
+    if constexpr (!kRates) return side_by_side(W, {0.0, 0.0, 0.0});
     const Vector3 rate = cross(spin, W) + Vector3{on_v * v.x + on_u * v.along * ux,
                                                   on_v * v.y + on_u * v.along * uy, on_z * v.along};
     return side_by_side(W, rate);
   }
 };
 
+template <bool kRates>
 [[gnu::always_inline]] inline OwnColumns<false> at_constant_length(double mass,
                                                                    const ArcColumnTerms& t,
                                                                    const Curve& centre) noexcept {
@@ -85,21 +88,25 @@ struct ArcColumnTerms {
   const auto c = point_motion(centre, SegmentState<false>{ux, uy, t.v, t.spin, {}});
   OwnColumns<false> out;
   out.momentum = mass * c.J;
-  out.momentum_rate = mass * c.J_rate;
-  out.first = mass * side_by_side(c.place, c.rate);
+  out.first = mass * side_by_side(c.place, kRates ? c.rate : Vector3{0.0, 0.0, 0.0});
   out.angular = t.angular();
-  out.angular_rate = t.angular_rate();
-  out.flow = t.flow();
   const double stretch = 2.0 * m.pp1 + m.p1p1 * t.s + m.q1q1;
   out.inertia = {Pair{m.pp, 0.0} + (stretch * ux) * t.u, Pair{0.0, m.pp} + (stretch * uy) * t.u};
-  // spin . int J_y x J_x, skew in the two columns
-  const double skew = m.pq1 * t.spin_u - t.spin.z * (m.pp + m.pp1 * t.s);
-  out.coriolis = {t.coriolis_row(ux, t.g_x) + Pair{0.0, skew},
-                  t.coriolis_row(uy, t.g_y) + Pair{-skew, 0.0}};
-  out.second = {
-      t.second_row({m.pp * ux * ux, m.pp * ux * uy, m.pq * ux}, m.pp * ux, m.pp1 * ux, m.pq1 * ux),
-      t.second_row({m.pp * ux * uy, m.pp * uy * uy, m.pq * uy}, m.pp * uy, m.pp1 * uy, m.pq1 * uy),
-      t.second_row({m.pq * ux, m.pq * uy, m.qq}, m.pq, m.qp1, m.qq1)};
+  if constexpr (kRates) {
+    out.momentum_rate = mass * c.J_rate;
+    out.angular_rate = t.angular_rate();
+    out.flow = t.flow();
+    // spin . int J_y x J_x, skew in the two columns
+    const double skew = m.pq1 * t.spin_u - t.spin.z * (m.pp + m.pp1 * t.s);
+    out.coriolis = {t.coriolis_row(ux, t.g_x) + Pair{0.0, skew},
+                    t.coriolis_row(uy, t.g_y) + Pair{-skew, 0.0}};
+  }
+  const auto row = [&t](const Vector3& W, double on_v, double on_u, double on_z) {
+    return t.template second_row<kRates>(W, on_v, on_u, on_z);
+  };
+  out.second = {row({m.pp * ux * ux, m.pp * ux * uy, m.pq * ux}, m.pp * ux, m.pp1 * ux, m.pq1 * ux),
+                row({m.pp * ux * uy, m.pp * uy * uy, m.pq * uy}, m.pp * uy, m.pp1 * uy, m.pq1 * uy),
+                row({m.pq * ux, m.pq * uy, m.qq}, m.pq, m.qp1, m.qq1)};
   return out;
 }
 
@@ -109,35 +116,41 @@ PairVector3 grown(const PairVector3& y, double strain_rate) noexcept {
 }
 
 /// All points are linear in l: the columns along u grow, and that along e is r / l.
+template <bool kRates>
 OwnColumns<true> with_elongation(const ArcColumnTerms& t, const OwnColumns<false>& held,
                                  const Stretch<true>& stretch) noexcept {
   const double grow = stretch.strain_rate, per_length = stretch.inverse_length;
+  const double per_area = per_length * per_length;
   const ArcMoments& m = t.m;
-  // int r x r', int r . J_e, int r . J_e' and int J_e . r' at constant length
+  const Pair radial = m.trace_rate(t.s) * t.u;  // int r . J_e at constant length
+
+  OwnColumns<true> out;
+  out.momentum = beside(held.momentum, per_length * column(held.first, 0));
+  out.angular = without_elongation<true>(held.angular);
+  for (int e = 0; e < 2; ++e) {
+    const auto row = static_cast<std::size_t>(e);
+    out.inertia[row] = beside(held.inertia[row], per_length * radial[e]);
+  }
+  out.inertia[2] = beside(per_length * radial, per_area * (m.pp * t.s + m.qq));
+  out.first = held.first;
+  out.second = held.second;
+  if constexpr (!kRates) return out;
+  // int r x r', int r . J_e' and int J_e . r' at constant length
   const Vector3 angular = t.v.x * column(held.angular, 0) + t.v.y * column(held.angular, 1) +
                           SecondMoments(held.second, 0).off_trace(t.spin);
-  const Pair radial = m.trace_rate(t.s) * t.u;
   const Pair turning = dot(t.spin, held.angular);
   const Pair radial_rate =
       (2.0 * m.pp1 + m.pp2 * t.s + m.qq2) * t.kappa + (m.pp1 * t.s + m.qq1) * t.dv - turning;
   const Pair along_rate = t.v.x * held.inertia[0] + t.v.y * held.inertia[1] + turning;
-
-  OwnColumns<true> out;
-  out.momentum = beside(held.momentum, per_length * column(held.first, 0));
   out.momentum_rate =
       beside(held.momentum_rate + grow * held.momentum, per_length * column(held.first, 1));
-  out.angular = without_elongation<true>(held.angular);
   out.angular_rate = beside(held.angular_rate + grow * held.angular, per_length * angular);
   out.flow = beside(held.flow + grow * held.angular, -per_length * angular);
-  const auto rows = [&](std::size_t e, int lane) {
-    out.inertia[e] = beside(held.inertia[e], per_length * radial[lane]);
-    out.coriolis[e] =
-        beside(held.coriolis[e] + grow * held.inertia[e], per_length * along_rate[lane]);
-  };
-  rows(0, 0);
-  rows(1, 1);
-  const double per_area = per_length * per_length;
-  out.inertia[2] = beside(per_length * radial, per_area * (m.pp * t.s + m.qq));
+  for (int e = 0; e < 2; ++e) {
+    const auto row = static_cast<std::size_t>(e);
+    out.coriolis[row] =
+        beside(held.coriolis[row] + grow * held.inertia[row], per_length * along_rate[e]);
+  }
   out.coriolis[2] =
       beside(per_length * (radial_rate + grow * radial), per_area * m.trace_rate(t.s) * t.v.along);
   out.first = grown(held.first, grow);
@@ -147,21 +160,25 @@ OwnColumns<true> with_elongation(const ArcColumnTerms& t, const OwnColumns<false
 
 }  // namespace
 
-template <bool kExtensible>
+template <bool kRates, bool kExtensible>
 OwnColumns<kExtensible> arc_columns(double mass, const SegmentState<kExtensible>& state,
                                     const Curve& centre, const ArcMoments& m) noexcept {
   const ArcColumnTerms t(state, m);
-  const OwnColumns<false> held = at_constant_length(mass, t, centre);
+  const OwnColumns<false> held = at_constant_length<kRates>(mass, t, centre);
   if constexpr (kExtensible) {
-    return with_elongation(t, held, state.stretch);
+    return with_elongation<kRates>(t, held, state.stretch);
   } else {
     return held;
   }
 }
 
-template OwnColumns<false> arc_columns(double, const SegmentState<false>&, const Curve&,
-                                       const ArcMoments&) noexcept;
-template OwnColumns<true> arc_columns(double, const SegmentState<true>&, const Curve&,
-                                      const ArcMoments&) noexcept;
+#define SOFTARM_ARC_COLUMNS(rates, extensible)                                                \
+  template OwnColumns<extensible> arc_columns<rates>(double, const SegmentState<extensible>&, \
+                                                     const Curve&, const ArcMoments&) noexcept
+SOFTARM_ARC_COLUMNS(false, false);
+SOFTARM_ARC_COLUMNS(false, true);
+SOFTARM_ARC_COLUMNS(true, false);
+SOFTARM_ARC_COLUMNS(true, true);
+#undef SOFTARM_ARC_COLUMNS
 
 }  // namespace softarm

@@ -29,31 +29,33 @@ struct OwnColumns {
   Vec3<PairVector3> second;    ///< row i: {int r_i r, int r_i r'}
 };
 
-/// All mass in the centre: r = c.
-template <bool kExtensible>
+/// All mass in the centre: r = c. Without kRates the rates and what C needs are left as they are.
+template <bool kRates, bool kExtensible>
 [[gnu::always_inline]] inline OwnColumns<kExtensible> point_columns(
     double mass, const SegmentState<kExtensible>& state, const Curve& centre) noexcept {
   const auto c = point_motion(centre, state);
   OwnColumns<kExtensible> out;
   out.momentum = mass * c.J;
   out.angular = cross(c.place, out.momentum);
-  out.momentum_rate = mass * c.J_rate;
-  out.angular_rate = cross(c.place, out.momentum_rate);
-  out.flow = cross(c.rate, out.momentum);
+  if constexpr (kRates) {
+    out.momentum_rate = mass * c.J_rate;
+    out.angular_rate = cross(c.place, out.momentum_rate);
+    out.flow = cross(c.rate, out.momentum);
+  }
   const auto set_row = [&](std::size_t row, const Vector3& J) {
     out.inertia[row] = dot(J, out.momentum);
-    out.coriolis[row] = dot(J, out.momentum_rate);
+    if constexpr (kRates) out.coriolis[row] = dot(J, out.momentum_rate);
   };
   set_row(0, column(c.J, 0));
   set_row(1, column(c.J, 1));
   if constexpr (kExtensible) set_row(2, column(c.J, 2));
-  out.first = mass * side_by_side(c.place, c.rate);
+  out.first = mass * side_by_side(c.place, kRates ? c.rate : Vector3{0.0, 0.0, 0.0});
   out.second = {c.place.x * out.first, c.place.y * out.first, c.place.z * out.first};
   return out;
 }
 
 /// Second moments of the arc in place of products of its centre; first moments as for the point.
-template <bool kExtensible>
+template <bool kRates, bool kExtensible>
 OwnColumns<kExtensible> arc_columns(double mass, const SegmentState<kExtensible>& state,
                                     const Curve& centre, const ArcMoments& m) noexcept;
 

@@ -76,10 +76,7 @@ void prepare(const ArmParameters& arm, const Inputs& in, int begin, Segments& k)
   constexpr int kWidth = kCoordinates<kExtensible>;
   const int count = arm.size() - begin;
   const int first_of = kWidth * begin;
-  k.ux = coordinate<L>(load(in.u + first_of, kWidth, count), 0);
-  k.uy = coordinate<L>(load(in.u + first_of + 1, kWidth, count), 1);
-  const auto length = set_shape<kArc, kExtensible>(arm, begin, in.u + first_of, k);
-  if constexpr (kExtensible) k.inverse_length = 1.0 / length;
+  load_shape<kArc>(arm, begin, in.u, k);
   DirectionOf<L> x{};
   if constexpr (kInertia) x = load_direction<kExtensible>(in.x + first_of, count, k);
   if constexpr (kCoriolis) {

@@ -129,4 +129,17 @@ struct ExtensibleLanesOf : SegmentLanesOf<L> {
 template <bool kExtensible, class L>
 using LanesOf = std::conditional_t<kExtensible, ExtensibleLanesOf<L>, SegmentLanesOf<L>>;
 
+/// Shape of the segments from `begin` on: u is that of the whole arm.
+template <bool kArc, class Segments>
+inline void load_shape(const ArmParameters& arm, int begin, const double* u, Segments& k) noexcept {
+  using L = typename Segments::Lane;
+  constexpr int kWidth = kCoordinates<Segments::kExtensible>;
+  const int count = arm.size() - begin;
+  const double* const q = u + kWidth * begin;
+  k.ux = coordinate<L>(load(q, kWidth, count), 0);
+  k.uy = coordinate<L>(load(q + 1, kWidth, count), 1);
+  const auto length = set_shape<kArc, Segments::kExtensible>(arm, begin, q, k);
+  if constexpr (Segments::kExtensible) k.inverse_length = 1.0 / length;
+}
+
 }  // namespace softarm

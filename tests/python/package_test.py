@@ -59,6 +59,27 @@ class Model(unittest.TestCase):
             np.testing.assert_allclose(arm.forward_dynamics(u, velocity, force), acceleration, atol=1e-9)
             np.testing.assert_allclose(arm.static_moments(u), arm.inverse_dynamics(u, 0 * u, 0 * u), atol=1e-13)
 
+    def test_rows_lists_and_keywords_are_one_call(self):
+        """Plain rows take a shorter way into C++."""
+        arm = softarm.Arm(softarm.load_experiment(PAPER_ARM))
+        u, velocity, force = np.random.default_rng(7).normal(size=(3, arm.dof))
+        for method, name in ((arm.forward_dynamics, "generalized_force_nm"), (arm.inverse_dynamics, "acceleration")):
+            rows = method(u, velocity, force)
+            np.testing.assert_array_equal(rows, method(list(u), velocity, force))
+            np.testing.assert_array_equal(rows, method(u, velocity, **{name: force}))
+            np.testing.assert_array_equal(rows, method(u, velocity, np.repeat(force, 2)[::2]))
+            np.testing.assert_array_equal(rows, type(arm).__dict__[method.__name__](arm, u, velocity, force))
+            wrong = ((velocity[1:], "velocity: expected 6 numbers, got 5"), (np.full(6, np.inf), "velocity: expected finite numbers"))
+            for value, said in wrong:
+                with self.assertRaisesRegex(ValueError, said):
+                    method(u, value, force)
+            for arguments in ((u, velocity), (u, velocity, "force"), (u, velocity, force, force)):
+                with self.assertRaises(TypeError):
+                    method(*arguments)
+            with self.assertRaises(TypeError):
+                type(arm).__dict__[method.__name__](u, u, velocity, force)
+            self.assertIn("(2n,)", method.__doc__)
+
     def test_the_arc_ends_where_the_segments_do(self):
         arm = softarm.Arm(softarm.load_experiment(PAPER_ARM))
         u = np.array([0.3, -0.2, 0.0, 0.0, 1.5, 2.0])

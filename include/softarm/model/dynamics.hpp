@@ -72,8 +72,8 @@ bool forward_dynamics(const ArmParameters& arm, DynamicsWorkspace& workspace, Co
                       ConstVectorRef velocity, ConstVectorRef generalized_force,
                       VectorRef acceleration) noexcept;
 
-/// Solves B x = rhs for symmetric positive definite B by Cholesky with diagonal scaling and one
-/// step of refinement.
+/// Solves B x = rhs for symmetric positive definite B by L D L' and one step of refinement, with
+/// the residual in extended precision.
 /// @return false (and NaN in x) where B is not positive definite in double precision. `x` may alias
 /// `rhs`.
 bool solve_inertia(DynamicsWorkspace& workspace, const Eigen::Ref<const Eigen::MatrixXd>& B,
