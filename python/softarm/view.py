@@ -169,7 +169,7 @@ class View:
         middle = straight.mean(axis=0)
         scene = self.server.scene
         scene.set_up_direction("+z")
-        # Shadows and the picture of a room that lights the scene take a third of the frames where a processor draws.
+        # Shadows and the environment map take a third of the frames where a processor draws.
         scene.configure_default_lights(cast_shadow=False)
         scene.configure_environment_map(None)
         scene.add_light_ambient("/light", intensity=2.0)
