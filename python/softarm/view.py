@@ -283,11 +283,14 @@ class View:
 
 def play(view, pictures):
     pause, speed = view.add_player()
+    shown = None
     while True:
         t_s = pictures[0].t_s
         index = 0
         while index < len(pictures):
-            view.show(pictures[index])
+            if pictures[index] is not shown:  # a picture once, however long the pause
+                shown = pictures[index]
+                view.show(shown)
             time.sleep(FRAME_S)
             if not pause.value:
                 t_s += FRAME_S * speed.value
