@@ -19,6 +19,7 @@ POINTS_PER_SEGMENT = 12
 PATH_POINTS = 400
 PLOT_S = 10.0
 FRAME_S = 1.0 / 30.0
+PLOT_EVERY_S = 0.5
 SILENT_S = 1.0
 MEASURED, REFERENCE, TRUTH, TIP = (31, 119, 180), (44, 160, 44), (150, 150, 150), (235, 80, 10)
 EMPTY, FULL = np.array([70, 110, 200]), np.array([220, 60, 40])
@@ -168,6 +169,10 @@ class View:
         middle = straight.mean(axis=0)
         scene = self.server.scene
         scene.set_up_direction("+z")
+        # Shadows and the environment map take a third of the frames where a processor draws.
+        scene.configure_default_lights(cast_shadow=False)
+        scene.configure_environment_map(None)
+        scene.add_light_ambient("/light", intensity=2.0)
         self.server.initial_camera.position = middle + np.array([1.2, 1.2, 0.5]) * reach
         self.server.initial_camera.look_at = middle
         scene.add_grid("/floor", 2 * reach, 2 * reach, cell_size=reach / 10, position=(0, 0, straight[:, 2].min() - 0.1 * reach))
@@ -194,6 +199,7 @@ class View:
             for name, label in (("error", "largest error of u in mrad"), ("pressure", "largest pressure in bar"))
         }
         self._history = []
+        self._plot_at = 0.0
 
     def add_control(self, client):
         """Buttons for an operator's requests; each but the emergency stop asks once more."""
@@ -255,7 +261,8 @@ class View:
             self._history = self._history[-1:]
         while self._history[-1][0] - self._history[0][0] > PLOT_S:
             self._history.pop(0)
-        if len(self._history) % 5 == 0:
+        if time.monotonic() >= self._plot_at:
+            self._plot_at = time.monotonic() + PLOT_EVERY_S
             t, error, pressure = np.array(self._history).T
             self._plots["error"].data = (t, np.nan_to_num(error))
             self._plots["pressure"].data = (t, np.nan_to_num(pressure))
@@ -276,11 +283,14 @@ class View:
 
 def play(view, pictures):
     pause, speed = view.add_player()
+    shown = None
     while True:
         t_s = pictures[0].t_s
         index = 0
         while index < len(pictures):
-            view.show(pictures[index])
+            if pictures[index] is not shown:  # a picture once, however long the pause
+                shown = pictures[index]
+                view.show(shown)
             time.sleep(FRAME_S)
             if not pause.value:
                 t_s += FRAME_S * speed.value

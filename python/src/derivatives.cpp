@@ -8,21 +8,18 @@
 namespace softarm::python {
 namespace {
 
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
-
-MatrixXd square(const Arm& arm) { return {arm.parameters.dof(), arm.parameters.dof()}; }
+MatrixResult square(const Arm& arm) { return {arm.parameters.dof(), arm.parameters.dof()}; }
 
 py::tuple forward_dynamics_derivatives(Arm& arm, const Vector& u, const Vector& velocity,
                                        const Vector& force) {
   Result acceleration(arm.parameters.dof());
-  MatrixXd by_u = square(arm), by_velocity = square(arm), by_force = square(arm);
+  MatrixResult by_u = square(arm), by_velocity = square(arm), by_force = square(arm);
   if (!arm.derivatives().forward_dynamics(arm.u(u), arm.u(velocity, "velocity"),
                                           arm.u(force, "generalized_force_nm"), acceleration.vector,
-                                          by_u, by_velocity, by_force)) {
+                                          by_u.matrix, by_velocity.matrix, by_force.matrix)) {
     throw std::domain_error("the inertia matrix is not positive definite in double precision");
   }
-  return py::make_tuple(acceleration.array, by_u, by_velocity, by_force);
+  return py::make_tuple(acceleration.array, by_u.array, by_velocity.array, by_force.array);
 }
 
 }  // namespace
@@ -37,10 +34,11 @@ void bind_derivatives(py::class_<Arm>& type) {
       .def(
           "inverse_dynamics_by_u",
           [](Arm& arm, const Vector& u, const Vector& velocity, const Vector& acceleration) {
-            MatrixXd by_u = square(arm);
+            MatrixResult by_u = square(arm);
             arm.derivatives().inverse_dynamics_by_u(arm.u(u), arm.u(velocity, "velocity"),
-                                                    arm.u(acceleration, "acceleration"), by_u);
-            return by_u;
+                                                    arm.u(acceleration, "acceleration"),
+                                                    by_u.matrix);
+            return by_u.array;
           },
           py::arg("u"), py::arg("velocity"), py::arg("acceleration"),
           "d inverse_dynamics / du with u' and u'' held, (2n, 2n), N m/rad; exact. By u': 2 C + "
@@ -49,9 +47,9 @@ void bind_derivatives(py::class_<Arm>& type) {
       .def(
           "static_stiffness",
           [](Arm& arm, const Vector& u) {
-            MatrixXd by_u = square(arm);
-            arm.derivatives().static_stiffness(arm.u(u), by_u);
-            return by_u;
+            MatrixResult by_u = square(arm);
+            arm.derivatives().static_stiffness(arm.u(u), by_u.matrix);
+            return by_u.array;
           },
           py::arg("u"),
           "K + dG/du, (2n, 2n), N m/rad: the slope of static_moments, exact. The shape at rest "
@@ -60,9 +58,9 @@ void bind_derivatives(py::class_<Arm>& type) {
       .def(
           "actuation_slope",
           [](const Arm& arm, const Vector& u, const Vector& tau) {
-            MatrixXd by_u = square(arm);
-            actuation_slope(arm.parameters, arm.u(u), arm.u(tau, "tau_actuation_nm"), by_u);
-            return by_u;
+            MatrixResult by_u = square(arm);
+            actuation_slope(arm.parameters, arm.u(u), arm.u(tau, "tau_actuation_nm"), by_u.matrix);
+            return by_u.array;
           },
           py::arg("u"), py::arg("tau_actuation_nm"),
           "d (A(u) tau_A) / du with tau_A held, (2n, 2n), N m/rad; zero for 'chamber'.");

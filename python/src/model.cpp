@@ -197,20 +197,20 @@ void bind_dynamics(py::class_<Arm>& type) {
   type.def(
           "inertia",
           [](Arm& arm, const Vector& u) {
-            MatrixXd B(arm.parameters.dof(), arm.parameters.dof());
-            inertia_matrix(arm.parameters, arm.workspace, arm.u(u), B);
-            return B;
+            MatrixResult B(arm.parameters.dof(), arm.parameters.dof());
+            inertia_matrix(arm.parameters, arm.workspace, arm.u(u), B.matrix);
+            return B.array;
           },
           py::arg("u"), "B(u), (2n, 2n), kg m^2.")
       .def(
           "dynamics_matrices",
           [](Arm& arm, const Vector& u, const Vector& velocity) {
             const int dof = arm.parameters.dof();
-            MatrixXd B(dof, dof), C(dof, dof);
-            VectorXd G(dof);
+            MatrixResult B(dof, dof), C(dof, dof);
+            Result G(dof);
             dynamics_matrices(arm.parameters, arm.workspace, arm.u(u), arm.u(velocity, "velocity"),
-                              B, C, G);
-            return py::make_tuple(B, C, G);
+                              B.matrix, C.matrix, G.vector);
+            return py::make_tuple(B.array, C.array, G.array);
           },
           py::arg("u"), py::arg("velocity"),
           "B(u) in kg m^2, C(u, u') (Christoffel, B' - 2C is skew) in kg m^2/s, G(u) in N m.")

@@ -25,17 +25,28 @@ bool Vector::look_at(py::handle source) noexcept {
   return true;
 }
 
-Result::Result(Eigen::Index size) : vector(nullptr, size) {
+namespace {
+
+/// A new array of doubles and its memory; of two dimensions column by column.
+double* make_array(std::initializer_list<py::ssize_t> shape, py::object& out) {
   static PyObject* const kDouble = py::dtype::of<double>().release().ptr();
+  constexpr int kColumns = py::detail::npy_api::NPY_ARRAY_F_CONTIGUOUS_;
   const auto& numpy = py::detail::npy_api::get();
-  py::ssize_t shape = size;
   Py_INCREF(kDouble);  // the array takes one
-  array = py::reinterpret_steal<py::object>(numpy.PyArray_NewFromDescr_(
-      numpy.PyArray_Type_, kDouble, 1, &shape, nullptr, nullptr, 0, nullptr));
-  if (!array) throw py::error_already_set();
-  void* const data = py::detail::array_proxy(array.ptr())->data;
-  new (&vector) Eigen::Map<Eigen::VectorXd>(static_cast<double*>(data), size);
+  out = py::reinterpret_steal<py::object>(numpy.PyArray_NewFromDescr_(
+      numpy.PyArray_Type_, kDouble, static_cast<int>(shape.size()), shape.begin(), nullptr, nullptr,
+      shape.size() > 1 ? kColumns : 0, nullptr));
+  if (!out) throw py::error_already_set();
+  void* const data = py::detail::array_proxy(out.ptr())->data;
+  return static_cast<double*>(data);
 }
+
+}  // namespace
+
+Result::Result(Eigen::Index size) : vector(make_array({size}, array), size) {}
+
+MatrixResult::MatrixResult(Eigen::Index rows, Eigen::Index columns)
+    : matrix(make_array({rows, columns}, array), rows, columns) {}
 
 ConstVectorRef expect(ConstVectorRef vector, Eigen::Index size, const char* name) {
   if (vector.size() != size) {

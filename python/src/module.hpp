@@ -40,6 +40,13 @@ struct Result {
   Eigen::Map<Eigen::VectorXd> vector;
 };
 
+/// A matrix result, the same; column by column.
+struct MatrixResult {
+  MatrixResult(Eigen::Index rows, Eigen::Index columns);
+  py::object array;
+  Eigen::Map<Eigen::MatrixXd> matrix;
+};
+
 /// An argument of `size` finite numbers, itself: for use within the same expression.
 /// @throws std::invalid_argument (ValueError) naming it.
 ConstVectorRef expect(ConstVectorRef vector, Eigen::Index size, const char* name);

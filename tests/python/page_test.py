@@ -87,6 +87,32 @@ class Pages(unittest.TestCase):
                 wait_for(seen, f"a tip where the camera would see {text}")
             self.assertEqual(page.errors, [])
 
+    def test_a_recorded_run_plays_and_pauses(self):
+        recorded(self.folder, "--no-plots")
+        player = subprocess.Popen(
+            [SOFTARM, "view", CONFIG, "--log", self.folder, "--port", "0"], stdout=subprocess.PIPE, text=True, bufsize=1
+        )
+        self.addCleanup(player.stdout.close)
+        self.addCleanup(player.wait, 30)
+        self.addCleanup(player.terminate)
+        url = next(found[1] for line in player.stdout if (found := re.search(r"(http://\S+)", line)))
+        text = "[...document.querySelectorAll('p')].map(p => p.textContent).find(t => t.includes('tip ['))"
+        with browser.Page(url) as page:
+            first = page.wait(text)
+            page.wait(f"{text} !== {first!r}", "motion")
+            page.value("document.querySelector('input[type=checkbox]').click()")
+
+            def still():
+                before = page.value(text)
+                time.sleep(0.5)  # fifteen pictures
+                return page.value(text) == before
+
+            wait_for(still, "a pause")
+            page.value("document.querySelector('input[type=checkbox]').click()")
+            paused = page.value(text)
+            page.wait(f"{text} !== {paused!r}", "motion again")
+            self.assertEqual(page.errors, [])
+
     @staticmethod
     def projected(camera, point):
         """Pixel of a point in the world, in a picture of the camera's own size; its z axis looks ahead, y down."""

@@ -53,9 +53,10 @@ NOT_RUN = {
     "tools/fuzz": MEASURES,
     "tools/fuzz tick_record_t --runs 100000": "builds with clang; tools/test --all runs every target",
     "tools/with_loopback_network build/release/bin/softarm-dev soak config/paper_arm.yaml --duration 3600 --between 2": MEASURES,
+    "chrt -f 20 build/release/bin/softarm-dev soak config/paper_arm.yaml --duration 3600 --between 2 --seed 20261130": MEASURES,
     "tools/with_loopback_network build/release/bin/softarm-dev bench loop": MEASURES,
     "tools/with_loopback_network build/release/bin/softarm-dev bench loop --law --seconds 10": MEASURES,
-    "tools/with_loopback_network build/python/bin/python tests/python/page_cost.py build/release/bin 4 8": MEASURES,
+    "tools/with_loopback_network build/python/bin/python tests/python/page_cost.py build/release/bin 3 6": MEASURES,
     "ROUNDS=5 tools/with_loopback_network python3 tests/scripts/every_interface_test.py build/release/bin":
         MEASURES + "; scripts.every_interface",
     "SOFTARM_HOSTILE_PACKETS=1000000 tools/with_loopback_network build/release/bin/faults_softarmd_tests "
