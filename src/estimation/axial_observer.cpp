@@ -134,8 +134,7 @@ void AxialObserver::propagate(double step_s, const KnownMotion* reference) noexc
 }
 
 bool AxialObserver::advance(std::int64_t time_ns, ConstVectorRef u_rad,
-                            ConstVectorRef velocity_radps,
-                            const KnownMotion* reference) noexcept {
+                            ConstVectorRef velocity_radps, const KnownMotion* reference) noexcept {
   const double step_s = to_seconds(time_ns - now_.force.time_ns);
   if (step_s <= 0.0) return true;
   const auto row = [&](const SegmentVector& q, const SegmentVector& v, const SegmentVector& a,
@@ -159,10 +158,10 @@ bool AxialObserver::advance(std::int64_t time_ns, ConstVectorRef u_rad,
   for (int i = 0; i < arm_.size(); ++i) {
     const auto k = static_cast<std::size_t>(i);
     q_.segment<3>(3 * i) << u_rad.segment<2>(2 * i), now_.e_m[i];
-    const double rate = arm_.segments[k].constant_length
-                            ? 0.0
-                            : (push_n(k, now_.force.tau_nm[i]) - stiffness(k) * now_.e_m[i]) /
-                                  damping(k);
+    const double rate =
+        arm_.segments[k].constant_length
+            ? 0.0
+            : (push_n(k, now_.force.tau_nm[i]) - stiffness(k) * now_.e_m[i]) / damping(k);
     velocity_.segment<3>(3 * i) << velocity_radps.segment<2>(2 * i), rate;
   }
   row(q_, velocity_, acceleration_, beside_n_);
@@ -184,12 +183,10 @@ bool AxialObserver::correct(const CurvatureEstimate& estimate, double since_s,
   at_limit_ = false;
   for (int i = 0; i < arm_.size(); ++i) {
     const auto k = static_cast<std::size_t>(i);
-    const double variance_m2 =
-        estimate.length_variance_m2[k] + kLeastNoise_m * kLeastNoise_m;
+    const double variance_m2 = estimate.length_variance_m2[k] + kLeastNoise_m * kLeastNoise_m;
     if (arm_.segments[k].constant_length || !estimate.valid[k] || !std::isfinite(variance_m2))
       continue;
-    const double innovation_m =
-        estimate.length_m[k] - arm_.segments[k].length_m - now_.e_m[i];
+    const double innovation_m = estimate.length_m[k] - arm_.segments[k].length_m - now_.e_m[i];
     const double all_m2 = P_[k](0, 0) + variance_m2;
     square += innovation_m * innovation_m / all_m2;
     ++seen;

@@ -462,8 +462,14 @@ void ControlPipeline::control(std::int64_t act_ns) noexcept {
   double lookahead_s = law_->lookahead_s();
   if (elongation_) lookahead_s = std::max(lookahead_s, ElongationReference::kLookahead_s);
   reference_.window(seconds(act_ns + ahead_ns), lookahead_s, window_);
-  if (elongation_) elongation_->advance(seconds(act_ns + ahead_ns), lookahead_s, window_);
-  const LawState state{output_.motion.u_rad, output_.motion.velocity_radps, correction()};
+  const ModelCorrection* const found = correction();
+  if (elongation_) {
+    const DisturbanceRejection use = settings_.control.disturbance;
+    elongation_->advance(seconds(act_ns + ahead_ns), lookahead_s, window_,
+                         use == DisturbanceRejection::none ? nullptr : found,
+                         use == DisturbanceRejection::cancel);
+  }
+  const LawState state{output_.motion.u_rad, output_.motion.velocity_radps, found};
   control_.answer = LawAnswer::force;
   control_.bounded = false;
   law_->compute(state, window_, control_);
