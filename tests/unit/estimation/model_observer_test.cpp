@@ -469,16 +469,19 @@ TEST(ModelObserver, FailsIntoSilenceAndStartsAgain) {
 }
 
 TEST(ModelObserver, AllocatesNothing) {
-  for (const int n : {3, 20, 128}) {
-    const ArmParameters arm = test::arm_of(n, 0.33 / n);
+  const std::pair<int, bool> arms[] = {
+      {3, false}, {20, false}, {128, false}, {3, true}, {20, true}};
+  for (const auto& [n, stretches] : arms) {
+    ArmParameters arm = test::arm_of(n, 0.33 / n);
+    arm.extensible = stretches;
     const EstimationSettings settings = observer_settings(3.5e-3);
     ModelObserver observer(arm, settings, body_noise(settings, n), {.valve_lag_s = kLag_s});
     CurvatureEstimator estimator(settings, arm, body_noise(settings, n));
-    MocapFrame frame = test::frame_of(arm, Eigen::VectorXd::Constant(2 * n, 0.3 / n));
+    MocapFrame frame = test::frame_of(arm, Eigen::VectorXd::Constant(arm.dof(), 0.3 / n));
     KnownMotion known;
     known.u_rad = known.velocity_radps = known.acceleration_radps2 =
-        SegmentVector::Constant(2 * n, 0.3 / n);
-    const SegmentVector tau = SegmentVector::Constant(2 * n, 0.01 / n);
+        SegmentVector::Constant(arm.dof(), 0.3 / n);
+    const SegmentVector tau = SegmentVector::Constant(arm.dof(), 0.01 / n);
     FilteredMotion out;
     ModelCorrection sigma;
     CurvatureEstimate estimate;
