@@ -142,7 +142,6 @@ class Checks {
        "a control.law that knows no axial force");
     for (const ReferencePhase& phase : experiment_.reference.phases)
       no(phase.kind.get_if<LiveTipReference>() != nullptr, "reference: live_tip");
-    no(experiment_.estimation.observer == ObserverKind::model, "estimation.observer: model");
     no(experiment_.estimation.method == CurvatureMethod::orientation,
        "estimation.method: orientation, which measures no lengths");
     for (const SegmentParameters& segment : experiment_.arm.segments) {

@@ -40,6 +40,8 @@ static void describe(Keys& key, ValveSettings& it) {
   KEY(resolution_bar, from(0, 100), "set points are rounded to its multiples; 0: exact");
   KEY(play_bar, from(0, 100), "half the backlash between set point and pressure");
   KEY(dead_band_bar, from(0, 100), "set points that move the valve by less do nothing");
+  KEY(supply_sag_s, from(0, 100),
+      "the common supply falls by this times the sum of rates of rising pressures; needs lag_s");
 }
 
 static void describe(Keys& key, MaterialSettings& it) {
@@ -51,6 +53,11 @@ static void describe(Keys& key, MaterialSettings& it) {
   KEY(remanence, from(0, 100),
       "a Maxwell element beside K, in parts of K: bent, the arm stays bent");
   KEY(remanence_s, from(1e-3, 1e6), "time constant of its relaxation");
+  KEY(bouc_wen, from(0, 100),
+      "hysteresis of the moment by Bouc and Wen beside K, in parts of K: bouc_wen K z");
+  KEY(bouc_wen_rad, above(0, kTwoPi), "z follows the bend until it saturates at this");
+  KEY(bouc_wen_exponent, from(1, 20), "the larger, the sharper the knee");
+  KEY(bouc_wen_shape, from(0.5, 1), "beta / (beta + gamma); 1/2: straight where it unloads");
 }
 
 static void describe(Keys& key, ExternalLoad& it) {
@@ -136,6 +143,11 @@ void describe_plant(Keys& key, Experiment& experiment) {
               [&] { describe_actuation(key, it.actuation, kOptional); });
   KEY(valves, "between commanded and real pressure (or torque, then in N m)");
   KEY(material, "how the body differs from a linear spring and damper");
+  it.cross_nm_per_bar.resize(
+      2 * it.arm.segments.size() * static_cast<std::size_t>(chamber_count(it.actuation)), 0.0);
+  KEY(cross_nm_per_bar, from(-1e4, 1e4).one_or_each(),
+      "of every chamber in turn, 2n numbers: generalized force in u on all segments beside its "
+      "own");
   KEY(mocap, "simulated motion capture");
   key.section({"initial", "where the arm starts, at rest"}, [&] {
     std::vector<double> u(it.initial_u_rad.begin(), it.initial_u_rad.end());

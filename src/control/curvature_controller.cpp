@@ -255,6 +255,11 @@ void CurvatureController::add_correction(const ModelCorrection& correction, Cons
     auto force = force_nm.segment<2>(width * i).array();
     force += off.stiffness * at(stiffness_) * at(r.u) + off.damping * at(damping_) * at(r.velocity);
     if (settings_.terms.gravity) force += off.load.x() * at(along_x_) + off.load.y() * at(along_y_);
+    if (width == 3) {
+      const int e = 3 * i + 2;
+      force_nm[e] += off.axial_stiffness * stiffness_[e] * r.u[e] +
+                     off.axial_damping * damping_[e] * r.velocity[e];
+    }
   }
 }
 
@@ -268,12 +273,18 @@ void CurvatureController::correct(const ModelCorrection& correction, ConstVector
     add_correction(correction, reference.after.u, reference.after, after_);
     out.tau_u_nm += settings_.valve_lag_s / reference.interval_s * (after_ - before_);
   }
-  if (settings_.disturbance == DisturbanceRejection::cancel)
-    out.tau_u_nm -= correction.disturbance_nm;
+  const bool cancels = settings_.disturbance == DisturbanceRejection::cancel;
   const int width = arm_.segment_dof();
-  for (int i = 0; i < arm_.size(); ++i)
-    out.tau_u_nm.segment<2>(width * i) /=
-        1.0 + correction.segment[static_cast<std::size_t>(i)].gain;
+  for (int i = 0; i < arm_.size(); ++i) {
+    const SegmentCorrection& off = correction.segment[static_cast<std::size_t>(i)];
+    auto bend = out.tau_u_nm.segment<2>(width * i);
+    if (cancels) bend -= correction.disturbance_nm.segment<2>(2 * i);
+    bend /= 1.0 + off.gain;
+    if (width == 2) continue;
+    double& along = out.tau_u_nm[3 * i + 2];
+    if (cancels) along -= off.axial_force_n;
+    along /= 1.0 + off.axial_gain;
+  }
 }
 
 }  // namespace softarm

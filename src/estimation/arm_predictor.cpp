@@ -8,10 +8,8 @@
 
 namespace softarm {
 
-TorqueHistory::TorqueHistory(int segments, int commands, double lag_s)
-    : lag_s_(lag_s),
-      ring_(static_cast<std::size_t>(commands)),
-      zero_(SegmentVector::Zero(2 * segments)) {
+TorqueHistory::TorqueHistory(int size, int commands, double lag_s)
+    : lag_s_(lag_s), ring_(static_cast<std::size_t>(commands)), zero_(SegmentVector::Zero(size)) {
   for (Command& each : ring_) each.tau_nm = zero_;
 }
 
@@ -75,6 +73,13 @@ ArmPredictor::ArmPredictor(const ArmParameters& arm)
     each->setZero(arm.dof());
 }
 
+void ArmPredictor::set_stretch(ConstVectorRef length_m, const SegmentVector& coupling_nm) noexcept {
+  coupling_ = coupling_nm;
+  for (int i = 0; i < arm_.size(); ++i)
+    arm_.segments[static_cast<std::size_t>(i)].length_m = length_m[i];
+  horizontal_.set_lengths(length_m);
+}
+
 void ArmPredictor::linearize(ConstVectorRef u, const ModelCorrection& correction) noexcept {
   inertia_matrix(arm_, workspace_, u, inertia_);
   factored_step_s_ = 0.0;
@@ -88,6 +93,7 @@ void ArmPredictor::linearize(ConstVectorRef u, const ModelCorrection& correction
     load_.segment<2>(2 * i) =
         off.load.x() * along_x_.segment<2>(2 * i) + off.load.y() * along_y_.segment<2>(2 * i);
   }
+  if (coupling_.size() > 0) load_ += coupling_;
 }
 
 void ArmPredictor::force(ConstVectorRef tau_nm, const ModelCorrection& correction,

@@ -24,8 +24,10 @@ struct LaggedTorque {
 /// torque, exactly.
 class TorqueHistory {
  public:
-  /// Keeps `commands` of them.
-  TorqueHistory(int segments, int commands, double lag_s);
+  /// Keeps `commands` of them, of `size` numbers each.
+  TorqueHistory(int size, int commands, double lag_s);
+
+  int size() const noexcept { return static_cast<int>(ring_.size()); }
 
   /// tau_A (2n) in force from `from_ns` on, not earlier than the last one.
   void command(std::int64_t from_ns, ConstVectorRef tau_nm) noexcept;
@@ -59,6 +61,10 @@ class ArmPredictor {
  public:
   explicit ArmPredictor(const ArmParameters& arm);
 
+  /// Of an arm whose segments stretch: they are now so long (n, m), and their stretching takes so much
+  /// of the force (2n, N m) from the next linearize() on.
+  void set_stretch(ConstVectorRef length_m, const SegmentVector& coupling_nm) noexcept;
+
   /// B, and the horizontal load, at u: to be renewed as the arm moves, once a frame.
   void linearize(ConstVectorRef u, const ModelCorrection& correction) noexcept;
   /// One step under a constant torque. False, with u and velocity unchanged, where B + h D + ...
@@ -82,7 +88,7 @@ class ArmPredictor {
   Eigen::MatrixXd inertia_, implicit_;
   Eigen::LLT<Eigen::MatrixXd> factor_;
   double factored_step_s_ = 0.0;
-  SegmentVector stiffness_, damping_, load_, along_x_, along_y_;
+  SegmentVector stiffness_, damping_, load_, along_x_, along_y_, coupling_;
   SegmentVector force_, product_, k1u_, k1v_, u2_, v2_, rate_, k2v_;
 };
 

@@ -6,6 +6,7 @@
 
 #include "estimation/observer_state.hpp"
 #include "softarm/base/time.hpp"
+#include "softarm/model/coordinates.hpp"
 
 namespace softarm {
 namespace {
@@ -23,11 +24,19 @@ ModelObserver::ModelObserver(ModelObserver&&) noexcept = default;
 ModelObserver& ModelObserver::operator=(ModelObserver&&) noexcept = default;
 
 void ModelObserver::command(std::int64_t now_ns, ConstVectorRef tau_actuation_nm) noexcept {
-  state_->history.command(now_ns + state_->delay_ns, tau_actuation_nm);
+  State& s = *state_;
+  const std::int64_t from_ns = now_ns + s.delay_ns;
+  if (s.axial) {
+    s.axial->command(from_ns, tau_actuation_nm);
+    s.history.command(from_ns, bend_part(s.whole, tau_actuation_nm));
+  } else {
+    s.history.command(from_ns, tau_actuation_nm);
+  }
 }
 
 void ModelObserver::vented() noexcept {
   state_->history.clear();
+  if (state_->axial) state_->axial->clear();
   state_->running = false;
 }
 
@@ -48,9 +57,21 @@ void ModelObserver::update(const MocapFrame& frame, const CurvatureEstimate& est
   s.newest_ns = frame.capture_ns;
   s.measure(frame, estimate, since_s);
   if (!s.running) {
-    if (std::all_of(s.seen.begin(), s.seen.begin() + n, [](bool each) { return each; }))
+    if (std::all_of(s.seen.begin(), s.seen.begin() + n, [](bool each) { return each; })) {
       s.start(frame.capture_ns);
+      if (s.axial) {
+        s.axial->start(frame.capture_ns, estimate);
+        s.take_lengths();
+      }
+    }
     return;
+  }
+  const KnownMotion* const whole = reference;
+  if (s.axial && reference != nullptr) {
+    for (auto part :
+         {&KnownMotion::u_rad, &KnownMotion::velocity_radps, &KnownMotion::acceleration_radps2})
+      s.bends.*part = bend_part(s.whole, reference->*part);
+    reference = &s.bends;
   }
   const bool usable = reference != nullptr && reference->u_rad.size() == 2 * n &&
                       reference->velocity_radps.size() == 2 * n &&
@@ -59,7 +80,12 @@ void ModelObserver::update(const MocapFrame& frame, const CurvatureEstimate& est
   s.learns = s.settings.learn_parameters && usable && learn && !s.monitor.jump();
   s.ahead_is_stale = true;
   if (!s.advance_base(frame.capture_ns, usable ? reference : nullptr) || !s.correct(since_s))
-    s.fail();
+    return s.fail();
+  if (!s.axial) return;
+  if (!s.axial->advance(frame.capture_ns, s.base.u, s.base.velocity, usable ? whole : nullptr) ||
+      !s.axial->correct(estimate, since_s, s.learns))
+    return s.fail();
+  s.take_lengths();
 }
 
 void ModelObserver::predict(std::int64_t now_ns, std::int64_t act_ns,
@@ -68,13 +94,16 @@ void ModelObserver::predict(std::int64_t now_ns, std::int64_t act_ns,
   const std::int64_t known_ns = now_ns + s.delay_ns, time_ns = act_ns + s.delay_ns;
   const int n = s.arm.size();
   out.segments = n;
-  out.u_rad.setZero(2 * n);
-  out.velocity_radps.setZero(2 * n);
+  const int dof = s.axial ? 3 * n : 2 * n;
+  out.u_rad.setZero(dof);
+  out.velocity_radps.setZero(dof);
   out.valid.fill(false);
   if (!s.running) return;
   // No frame will show what is older than this; so the way ahead stays short, however long the
   // silence.
-  if (!s.advance_base(now_ns - s.max_latency_ns, nullptr)) return s.fail();
+  const std::int64_t oldest_ns = now_ns - s.max_latency_ns;
+  if (!s.advance_base(oldest_ns, nullptr)) return s.fail();
+  if (s.axial && !s.axial->advance(oldest_ns, s.base.u, s.base.velocity, nullptr)) return s.fail();
   if (s.ahead_is_stale) {
     s.ahead = s.base;
     s.predictor.linearize(s.base.u, s.correction);
@@ -91,6 +120,11 @@ void ModelObserver::predict(std::int64_t now_ns, std::int64_t act_ns,
     if (!s.advance_motion(time_ns, last)) return s.fail();
     out.u_rad = last.u;
     out.velocity_radps = last.velocity;
+  }
+  if (s.axial) {
+    s.axial->predict(time_ns, s.length_m, s.rate_mps);
+    out.u_rad = coordinates(s.whole, out.u_rad, s.length_m);
+    out.velocity_radps = coordinates(s.whole, out.velocity_radps, s.rate_mps);
   }
   for (int i = 0; i < n; ++i) {
     const auto k = static_cast<std::size_t>(i);
@@ -167,6 +201,7 @@ void ModelObserver::deviation(ModelCorrection& out) const noexcept {
     }
     return true;
   });
+  if (state_->axial) state_->axial->put_deviation(out);
 }
 
 void ModelObserver::deviation(FilteredMotion& out) const noexcept {

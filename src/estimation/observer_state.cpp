@@ -8,6 +8,7 @@
 #include <type_traits>
 
 #include "softarm/base/time.hpp"
+#include "softarm/model/coordinates.hpp"
 
 namespace softarm {
 namespace {
@@ -46,7 +47,7 @@ void require(bool holds, const char* what, double value) {
 
 ModelObserver::State::State(const ArmParameters& arm_, const EstimationSettings& settings_,
                             std::span<const BodyNoise> noise_, const ObserverTiming& timing)
-    : arm(arm_),
+    : arm(at_rest_length(arm_)),
       settings(settings_.model_observer),
       predicted_frames(settings_.predicted_frames),
       max_latency_ns(to_ns(timing.max_latency_s)),
@@ -59,7 +60,7 @@ ModelObserver::State::State(const ArmParameters& arm_, const EstimationSettings&
             return by_orientation;
           }(),
           arm, noise_),
-      history(arm.size(),
+      history(2 * arm.size(),
               8 + static_cast<int>(std::ceil((timing.max_latency_s + timing.dead_time_s) /
                                              timing.control_period_s)),
               timing.valve_lag_s),
@@ -68,7 +69,6 @@ ModelObserver::State::State(const ArmParameters& arm_, const EstimationSettings&
       monitor(torque_scale(arm), settings.disturbance_drift_per_sqrt_s,
               settings.largest_disturbance_drift_per_sqrt_s),
       scale_nm(torque_scale(arm)) {
-  expect_constant_length(arm, "observer");
   require(settings.parameter_deviation >= 0.0, "parameter_deviation >= 0",
           settings.parameter_deviation);
   require(settings.disturbance_drift_per_sqrt_s > 0.0, "disturbance_drift_per_sqrt_s > 0",
@@ -77,6 +77,13 @@ ModelObserver::State::State(const ArmParameters& arm_, const EstimationSettings&
           "largest_disturbance_drift_per_sqrt_s not below the least",
           settings.largest_disturbance_drift_per_sqrt_s);
   const int n = arm.size();
+  if (arm_.extensible) {
+    whole = arm_;
+    rest_length_m.resize(n);
+    for (int i = 0; i < n; ++i)
+      rest_length_m[i] = arm.segments[static_cast<std::size_t>(i)].length_m;
+    axial = std::make_unique<AxialObserver>(arm_, settings, history.size(), timing.valve_lag_s);
+  }
   if (n <= kJoint) {
     joint_.emplace(n);
     gravity_slope.setZero(2 * n, 2 * n);
@@ -102,12 +109,23 @@ void ModelObserver::State::forget_parameters() noexcept {
   for (Parameters& shown : information) shown.setZero();
   correction.segment.fill({});
   correction.disturbance_nm.setZero(arm.dof());
+  if (axial) axial->forget_parameters();
   const double sigma = settings.learn_parameters ? settings.parameter_deviation : 0.0;
   for_groups([&](auto& errors, auto&, int) {
     using Vector = typename std::remove_cvref_t<decltype(errors)>::Vector;
     errors.reset(1.0, 1.0, Vector::Ones(errors.velocity()), sigma * sigma);
     return true;
   });
+}
+
+/// With e held, what bends see of a segment that stretches is its length.
+void ModelObserver::State::take_lengths() noexcept {
+  length_m = rest_length_m + axial->e_m();
+  for (int i = 0; i < arm.size(); ++i)
+    arm.segments[static_cast<std::size_t>(i)].length_m = length_m[i];
+  predictor.set_stretch(length_m, axial->coupling_nm());
+  axial->put(correction);
+  at_limit |= axial->at_limit();
 }
 
 /// At rest where a frame with every segment shows the arm.

@@ -4,11 +4,13 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
 
 #include "estimation/arm_predictor.hpp"
+#include "estimation/axial_observer.hpp"
 #include "estimation/base_average.hpp"
 #include "estimation/error_covariance.hpp"
 #include "estimation/innovation_monitor.hpp"
@@ -40,6 +42,7 @@ struct ModelObserver::State {
   void limit_corrections() noexcept;
   void fail() noexcept;
   void forget_parameters() noexcept;
+  void take_lengths() noexcept;
 
   template <int k>
   bool propagate(ErrorCovariance<k>& errors, GroupModel<2 * k>& model, int first,
@@ -54,7 +57,7 @@ struct ModelObserver::State {
     return true;
   }
 
-  ArmParameters arm;
+  ArmParameters arm;  ///< at its present lengths, not extensible
   ModelObserverSettings settings;
   int predicted_frames;
   std::int64_t max_latency_ns, delay_ns;
@@ -65,6 +68,11 @@ struct ModelObserver::State {
   BaseAverage base_average;
   InnovationMonitor monitor;
   SegmentVector scale_nm;
+
+  std::unique_ptr<AxialObserver> axial;  ///< where segments stretch
+  SegmentScalars rest_length_m, length_m, rate_mps;
+  ArmParameters whole;  ///< extensible, for splitting and joining coordinates
+  KnownMotion bends;    ///< the bends of a reference
 
   std::optional<ErrorCovariance<kJoint>> joint_;
   GroupModel<2 * kJoint> joint_model_;

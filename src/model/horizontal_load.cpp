@@ -16,6 +16,12 @@ HorizontalLoad::HorizontalLoad(const ArmParameters& arm) : arm_x_(arm), arm_y_(a
   arm_y_.gravity_mps2 = g * e_x.cross(down);
 }
 
+void HorizontalLoad::set_lengths(ConstVectorRef length_m) noexcept {
+  for (Eigen::Index i = 0; i < length_m.size(); ++i)
+    for (ArmParameters* arm : {&arm_x_, &arm_y_})
+      arm->segments[static_cast<std::size_t>(i)].length_m = length_m[i];
+}
+
 void HorizontalLoad::rows(ConstVectorRef u, DynamicsWorkspace& workspace, VectorRef along_x,
                           VectorRef along_y) const noexcept {
   constexpr DynamicsTerms kGravity{false, false, true};

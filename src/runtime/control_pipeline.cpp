@@ -7,6 +7,7 @@
 #include "softarm/base/time.hpp"
 #include "softarm/estimation/model_observer.hpp"
 #include "softarm/model/actuation_matrix.hpp"
+#include "softarm/model/coordinates.hpp"
 #include "softarm/runtime/elongation_reference.hpp"
 #include "softarm/runtime/settings.hpp"
 #include "softarm/runtime/static_hold.hpp"
@@ -54,7 +55,7 @@ SegmentScalars elongation(const PipelineSettings& settings, double pressure_bar)
 
 std::optional<ContactWatch> make_contact_watch(const PipelineSettings& settings) {
   if (settings.estimation.observer != ObserverKind::model) return std::nullopt;
-  return ContactWatch(settings.arm, settings.safety);
+  return ContactWatch(at_rest_length(settings.arm), settings.safety);
 }
 
 }  // namespace
@@ -289,8 +290,13 @@ void ControlPipeline::watch_contact(const TickInput& input, SafetyInput& safety)
     constexpr double kMemory_s = 0.03;  // that of the disturbance after a jump
     allocator_.torque(*input.measured_bar, measured_tau_nm_);
     observer_->modelled_torque(input.now_ns, modelled_tau_nm_);
+    const bool stretches = settings_.arm.extensible;
+    if (stretches)
+      modelled_tau_nm_ =
+          coordinates(settings_.arm, modelled_tau_nm_, SegmentScalars::Zero(settings_.arm.size()));
     measured_tau_nm_ -= modelled_tau_nm_;
     apply_actuation(settings_.arm, output_.motion.u_rad, measured_tau_nm_, modelled_tau_nm_);
+    if (stretches) modelled_tau_nm_ = bend_part(settings_.arm, modelled_tau_nm_);
     if (missing_nm_.size() == 0) missing_nm_.setZero(modelled_tau_nm_.size());
     missing_nm_ += std::min(1.0, period_s_ / kMemory_s) * (modelled_tau_nm_ - missing_nm_);
   }
@@ -454,8 +460,14 @@ void ControlPipeline::control(std::int64_t act_ns) noexcept {
   double lookahead_s = law_->lookahead_s();
   if (elongation_) lookahead_s = std::max(lookahead_s, ElongationReference::kLookahead_s);
   reference_.window(seconds(act_ns + ahead_ns), lookahead_s, window_);
-  if (elongation_) elongation_->advance(seconds(act_ns + ahead_ns), lookahead_s, window_);
-  const LawState state{output_.motion.u_rad, output_.motion.velocity_radps, correction()};
+  const ModelCorrection* const found = correction();
+  if (elongation_) {
+    const DisturbanceRejection use = settings_.control.disturbance;
+    elongation_->advance(seconds(act_ns + ahead_ns), lookahead_s, window_,
+                         use == DisturbanceRejection::none ? nullptr : found,
+                         use == DisturbanceRejection::cancel);
+  }
+  const LawState state{output_.motion.u_rad, output_.motion.velocity_radps, found};
   control_.answer = LawAnswer::force;
   control_.bounded = false;
   law_->compute(state, window_, control_);

@@ -18,6 +18,11 @@ double axial_force_n(const ActuationSettings& actuation, std::size_t segment, do
   return pressure_bar * axial_input_map(actuation.kind, actuation.segments[segment]).sum();
 }
 
+SegmentCorrection of(const ModelCorrection* correction, int segment) {
+  return correction == nullptr ? SegmentCorrection{}
+                               : correction->segment[static_cast<std::size_t>(segment)];
+}
+
 }  // namespace
 
 SegmentScalars straight_elongation(const ArmParameters& arm, const ActuationSettings& actuation,
@@ -47,10 +52,11 @@ SegmentScalars straight_elongation(const ArmParameters& arm, const ActuationSett
 ElongationReference::ElongationReference(const ArmParameters& arm,
                                          const ActuationSettings& actuation,
                                          const PressureAllocator& allocator)
-    : arm_(arm), allocator_(allocator), workspace_(arm) {
-  for (SegmentScalars* v : {&e_, &rate_, &acceleration_, &force_, &force_before_, &force_after_})
+    : arm_(arm), allocator_(allocator), workspace_(arm), horizontal_(arm) {
+  for (SegmentScalars* v : {&e_, &rate_, &acceleration_, &force_, &force_before_, &force_after_,
+                            &stiffness_, &damping_})
     v->setZero(arm.size());
-  tau_.setZero(arm.dof());
+  for (SegmentVector* v : {&tau_, &along_x_, &along_y_}) v->setZero(arm.dof());
   bias_n_.setZero(arm.size());
   for (int i = 0; i < arm.size(); ++i)
     bias_n_[i] = axial_force_n(actuation, static_cast<std::size_t>(i), actuation.bias_pressure_bar);
@@ -73,24 +79,35 @@ void ElongationReference::replace(double time_s, ReferenceSample& sample) const 
 }
 
 // force_ = N - I of the sample.
-void ElongationReference::force_beside_spring(double time_s,
-                                              const ReferenceSample& sample) noexcept {
+void ElongationReference::force_beside_spring(double time_s, const ReferenceSample& sample,
+                                              const ModelCorrection* correction,
+                                              bool forces) noexcept {
   sample_.u = sample.u;
   sample_.velocity = sample.velocity;
   sample_.acceleration = sample.acceleration;
   replace(time_s, sample_);
   inverse_dynamics(arm_, workspace_, sample_.u, sample_.velocity, sample_.velocity,
                    sample_.acceleration, {}, tau_);
+  if (correction != nullptr) horizontal_.rows(sample_.u, workspace_, along_x_, along_y_);
   for (int i = 0; i < arm_.size(); ++i) {
     const SegmentParameters& segment = arm_.segments[static_cast<std::size_t>(i)];
-    const Eigen::Vector2d bend = tau_.segment<2>(3 * i) +
-                                 segment.stiffness_nm_per_rad * sample.u.segment<2>(3 * i) +
-                                 segment.damping_nms_per_rad * sample.velocity.segment<2>(3 * i);
-    const double beside_n = tau_[3 * i + 2];
-    const double wanted_n = beside_n + segment.axial_stiffness_n_per_m * sample.u[3 * i + 2] +
-                            segment.axial_damping_ns_per_m * sample.velocity[3 * i + 2];
+    const SegmentCorrection off = of(correction, i);
+    Eigen::Vector2d bend =
+        tau_.segment<2>(3 * i) +
+        (1.0 + off.stiffness) * segment.stiffness_nm_per_rad * sample.u.segment<2>(3 * i) +
+        (1.0 + off.damping) * segment.damping_nms_per_rad * sample.velocity.segment<2>(3 * i);
+    if (correction != nullptr) {
+      bend += off.load.x() * along_x_.segment<2>(3 * i) + off.load.y() * along_y_.segment<2>(3 * i);
+      if (forces) bend -= correction->disturbance_nm.segment<2>(2 * i);
+      bend /= 1.0 + off.gain;
+    }
+    const double beside_n = tau_[3 * i + 2], unknown_n = forces ? off.axial_force_n : 0.0;
+    const double wanted_n =
+        beside_n + stiffness_[i] * sample.u[3 * i + 2] + damping_[i] * sample.velocity[3 * i + 2];
     // tau_A = A_chamber^-1 bend
-    force_[i] = allocator_.axial(i).within_reach({-bend.y(), bend.x()}, wanted_n) - beside_n;
+    const double chambers_n = allocator_.axial(i).within_reach(
+        {-bend.y(), bend.x()}, (wanted_n - unknown_n) / (1.0 + off.axial_gain));
+    force_[i] = (1.0 + off.axial_gain) * chambers_n + unknown_n - beside_n;
   }
 }
 
@@ -100,20 +117,25 @@ void ElongationReference::hold_constant_lengths(SegmentVector& tau_actuation_nm)
       tau_actuation_nm[3 * i + 2] = bias_n_[i];
 }
 
-void ElongationReference::advance(double time_s, double lookahead_s,
-                                  ReferenceWindow& window) noexcept {
+void ElongationReference::advance(double time_s, double lookahead_s, ReferenceWindow& window,
+                                  const ModelCorrection* correction, bool forces) noexcept {
+  for (int i = 0; i < arm_.size(); ++i) {
+    const SegmentParameters& segment = arm_.segments[static_cast<std::size_t>(i)];
+    const SegmentCorrection off = of(correction, i);
+    stiffness_[i] = (1.0 + off.axial_stiffness) * segment.axial_stiffness_n_per_m;
+    damping_[i] = (1.0 + off.axial_damping) * segment.axial_damping_ns_per_m;
+  }
   const double passed_s = std::max(time_s - time_s_, 0.0);
   const double after_s = time_s + lookahead_s, before_s = after_s - window.interval_s;
-  force_beside_spring(before_s, window.before);
+  force_beside_spring(before_s, window.before, correction, forces);
   force_before_ = force_;
-  force_beside_spring(after_s, window.after);
+  force_beside_spring(after_s, window.after, correction, forces);
   force_after_ = force_;
-  force_beside_spring(time_s, window.now);
+  force_beside_spring(time_s, window.now, correction, forces);
   for (int i = 0; i < arm_.size(); ++i) {
     const SegmentParameters& segment = arm_.segments[static_cast<std::size_t>(i)];
     if (segment.constant_length) continue;
-    const double stiffness = segment.axial_stiffness_n_per_m;
-    const double damping = segment.axial_damping_ns_per_m;
+    const double stiffness = stiffness_[i], damping = damping_[i];
     const double slope = (force_after_[i] - force_before_[i]) / window.interval_s;
     // Exact for a force that rises evenly.
     const double decay = std::exp(-passed_s * stiffness / damping);

@@ -15,7 +15,7 @@
 namespace softarm {
 namespace {
 
-/// What a material remembers is updated so often; relaxation takes seconds.
+/// What a material remembers, and what a supply gives, is updated so often; relaxation takes seconds.
 constexpr double kMemoryStep_s = 1e-3;
 
 void expect(bool holds, const std::string& expected, const std::string& got) {
@@ -51,6 +51,17 @@ const PlantSettings& checked(const PlantSettings& settings) {
     expect(std::isfinite(term) && term >= 0.0, "terms of material >= 0", std::to_string(term));
   expect(material.remanence == 0.0 || material.remanence_s > 0.0, "material.remanence_s > 0 s",
          std::to_string(material.remanence_s));
+  expect(std::isfinite(material.bouc_wen) && material.bouc_wen >= 0.0, "material.bouc_wen >= 0",
+         std::to_string(material.bouc_wen));
+  expect(material.bouc_wen == 0.0 ||
+             (material.bouc_wen_rad > 0.0 && material.bouc_wen_exponent >= 1.0 &&
+              material.bouc_wen_shape >= 0.5 && material.bouc_wen_shape <= 1.0),
+         "a limit > 0, an exponent >= 1 and a shape in [1/2, 1] of material.bouc_wen", "others");
+  const std::size_t forces = 2 * settings.arm.segments.size() *
+                             static_cast<std::size_t>(chamber_count(settings.actuation));
+  expect(settings.cross_nm_per_bar.empty() || settings.cross_nm_per_bar.size() == forces,
+         std::to_string(forces) + " numbers in cross_nm_per_bar",
+         std::to_string(settings.cross_nm_per_bar.size()));
   expect(settings.arm.gravity_mps2.allFinite(), "finite gravity", "another");
   for (const SegmentParameters& segment : settings.arm.segments) {
     expect(std::isfinite(segment.length_m) && segment.length_m > 0.0, "lengths > 0 m",
@@ -82,6 +93,19 @@ const PlantSettings& checked(const PlantSettings& settings) {
   return settings;
 }
 
+/// From pressures to generalized forces, with what chambers do to other segments.
+Eigen::MatrixXd forces_of_chambers(const PlantSettings& settings) {
+  Eigen::MatrixXd map = input_map(settings.actuation, settings.arm.extensible);
+  const int width = settings.arm.segment_dof();
+  for (std::size_t k = 0; k < settings.cross_nm_per_bar.size(); ++k) {
+    const auto n2 = 2 * settings.arm.segments.size();
+    const auto row = static_cast<int>(k % n2);
+    map(width * (row / 2) + row % 2, static_cast<Eigen::Index>(k / n2)) +=
+        settings.cross_nm_per_bar[k];
+  }
+  return map;
+}
+
 IntegratorSettings integrator_settings(const PlantSettings& settings) {
   return {.method = settings.method,
           .relative_tolerance = settings.relative_tolerance,
@@ -103,7 +127,7 @@ struct ArmPlant::Implementation {
         hysteresis(settings.material.hysteresis, settings.material.play_bar, valves.size()),
         follows_valves(!valves.exponential() || hysteresis.active() ||
                        settings.material.stiffening_per_bar != 0.0),
-        map(input_map(settings.actuation, settings.arm.extensible)),
+        map(forces_of_chambers(settings)),
         system(settings.kind.make(settings)),
         integrator(make_integrator(*system, integrator_settings(settings))),
         present_nm(Eigen::VectorXd::Zero(arm.dof())),
@@ -203,7 +227,8 @@ void ArmPlant::advance(double t_end_s) {
   while (t_end_s > self.integrator->time_s()) {
     const double from_s = self.integrator->time_s();
     double to_s = std::min(t_end_s, self.next_event_s());
-    if (self.system->remembers()) to_s = std::min(to_s, from_s + kMemoryStep_s);
+    if (self.system->remembers() || self.valves.sags())
+      to_s = std::min(to_s, from_s + kMemoryStep_s);
     self.integrator->advance(to_s);
     self.valves.advance(to_s - from_s);
     if (self.hysteresis.active()) self.hysteresis.remember(self.valves.pressures_bar());

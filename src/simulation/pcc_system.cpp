@@ -26,6 +26,9 @@ PccSystem::PccSystem(const PlantSettings& settings, const ArmParameters& arm, in
       loads_(arm_, pieces_, settings.payload_kg),
       material_(settings.material),
       bends_otherwise_(material_.bends_otherwise()),
+      bouc_wen_{.limit_rad = material_.bouc_wen_rad,
+                .exponent = material_.bouc_wen_exponent,
+                .shape = material_.bouc_wen_shape},
       workspace_(arm_),
       piece_ends_(static_cast<std::size_t>(arm_.size())) {
   const Eigen::Index n = arm_.dof();
@@ -42,7 +45,10 @@ PccSystem::PccSystem(const PlantSettings& settings, const ArmParameters& arm, in
       chamber += count;
     }
   }
-  if (remembers()) relaxed_rad_.setZero(2 * segments_);
+  if (remembers()) {
+    for (Eigen::VectorXd* each : {&relaxed_rad_, &yielded_rad_, &yielded_at_rad_})
+      each->setZero(2 * segments_);
+  }
   coriolis_.setZero(n, n);
   inertia_.setZero(n, n);
   const Eigen::VectorXd zero = Eigen::VectorXd::Zero(n), one = Eigen::VectorXd::Ones(n);
@@ -78,10 +84,17 @@ void PccSystem::add_material(double t_s, ConstVector u, Vector out) {
     const double k = arm_.segments[static_cast<std::size_t>(i)].stiffness_nm_per_rad;
     if (material_.stiffening_per_bar != 0.0)
       out.segment<2>(width_ * i) -= k * material_.stiffening_per_bar * pressure_sum_bar_[i] * bend;
-    if (remembers())
+    if (material_.remanence != 0.0)
       out.segment<2>(width_ * i) -=
           k * material_.remanence * (bend - relaxed_rad_.segment<2>(2 * i));
+    if (material_.bouc_wen != 0.0)
+      out.segment<2>(width_ * i) -= k * material_.bouc_wen * yielded(i, bend);
   }
+}
+
+Eigen::Vector2d PccSystem::yielded(int segment, const Eigen::Vector2d& bend) const {
+  return bouc_wen_.step(yielded_rad_.segment<2>(2 * segment),
+                        bend - yielded_at_rad_.segment<2>(2 * segment));
 }
 
 void PccSystem::add_cubic(ConstVector u, Vector out) const {
@@ -99,6 +112,12 @@ void PccSystem::remember(double passed_s, ConstVector u) {
       double& z = relaxed_rad_[2 * i + axis];
       z = element.step(z, u[width_ * i + axis], passed_s);
     }
+  if (material_.bouc_wen == 0.0) return;
+  for (int i = 0; i < segments_; ++i) {
+    const Eigen::Vector2d bend = u.segment<2>(width_ * i);
+    yielded_rad_.segment<2>(2 * i) = yielded(i, bend);
+    yielded_at_rad_.segment<2>(2 * i) = bend;
+  }
 }
 
 double PccSystem::unit(Eigen::Index i) const {

@@ -6,6 +6,7 @@
 
 #include "simulation/pcc_loads.hpp"
 #include "softarm/model/dynamics.hpp"
+#include "softarm/model/memory.hpp"
 #include "softarm/simulation/plant_system.hpp"
 #include "softarm/simulation/settings.hpp"
 
@@ -37,7 +38,7 @@ class PccSystem final : public PlantSystem {
   void segment_ends(ConstVector x, std::span<Eigen::Isometry3d> ends) const override;
   void curvature(ConstVector x, ConstVector v, Vector u, Vector rate) const override;
   PlantShape shape(ConstVector x) const override { return arcs(arm_, x); }
-  bool remembers() const override { return material_.remanence > 0.0; }
+  bool remembers() const override { return material_.remanence > 0.0 || material_.bouc_wen > 0.0; }
   void remember(double passed_s, ConstVector u) override;
 
  private:
@@ -49,6 +50,8 @@ class PccSystem final : public PlantSystem {
   bool has_lengths(ConstVector u) const;
   /// out -= what the material adds to K u, but for its cubic part: work done on the arm.
   void add_material(double t_s, ConstVector u, Vector out);
+  /// z of Bouc and Wen of a segment that has come to this bend.
+  Eigen::Vector2d yielded(int segment, const Eigen::Vector2d& bend) const;
   /// out += K cubic |u|^2 u.
   void add_cubic(ConstVector u, Vector out) const;
   double cubic_energy_j(ConstVector u) const;
@@ -65,6 +68,8 @@ class PccSystem final : public PlantSystem {
   bool bends_otherwise_;
   Eigen::MatrixXd segment_sum_;  // n x chambers, ones where a chamber is the segment's
   Eigen::VectorXd pressure_sum_bar_, relaxed_rad_;
+  BoucWen bouc_wen_;
+  Eigen::VectorXd yielded_rad_, yielded_at_rad_;  // z of Bouc and Wen, and u of that
   DynamicsWorkspace workspace_;
   Eigen::VectorXd stiffness_, damping_;            // diagonals of K and D
   Eigen::VectorXd shifted_, above_, below_, sum_;  // scratch

@@ -39,7 +39,7 @@ PlantSystem::PlantSystem(const PlantSettings& settings, bool stretches, bool ben
   if (settings.material.bends_otherwise() && !bends_otherwise) {
     throw std::invalid_argument(
         std::string("plant.material: expected nothing but hysteresis for kind ") +
-        settings.kind.name() + ", got cubic, stiffening or remanence");
+        settings.kind.name() + ", got cubic, stiffening, remanence or bouc_wen");
   }
 }
 

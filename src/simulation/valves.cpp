@@ -29,6 +29,8 @@ Valves::Valves(const ValveSettings& settings, int chambers, bool both_signs)
       resolution_bar_(settings.resolution_bar),
       play_bar_(settings.play_bar),
       dead_band_bar_(settings.dead_band_bar),
+      sag_s_(settings.supply_sag_s),
+      sagged_bar_(supply_bar_),
       pressure_bar_(Eigen::VectorXd::Zero(checked_count(chambers))),
       command_bar_(Eigen::VectorXd::Zero(chambers)) {
   const auto expect = [](double value, const char* key, const char* what) {
@@ -45,6 +47,36 @@ Valves::Valves(const ValveSettings& settings, int chambers, bool both_signs)
   expect(resolution_bar_, "resolution_bar", "pressure");
   expect(play_bar_, "play_bar", "pressure");
   expect(dead_band_bar_, "dead_band_bar", "pressure");
+  expect(sag_s_, "supply_sag_s", "time");
+  if (sags() && (lag_.fill_s == 0.0 || both_signs))
+    throw std::invalid_argument("valves.supply_sag_s: expected chambers with lag_s > 0");
+}
+
+double Valves::aim_bar(Eigen::Index i, double supply_bar) const noexcept {
+  const double command = command_bar_[i];
+  return sags() ? std::min(command, std::max(pressure_bar_[i], supply_bar)) : command;
+}
+
+double Valves::rise_bar_per_s(Eigen::Index i, double supply_bar) const noexcept {
+  const double rate = (aim_bar(i, supply_bar) - pressure_bar_[i]) / lag_.fill_s;
+  return std::max(0.0, slew_bar_per_s_ > 0.0 ? std::min(rate, slew_bar_per_s_) : rate);
+}
+
+/// The one S with S + sag sum p'(S) = supply: the left side rises with S. By bisection.
+void Valves::meet_supply() noexcept {
+  if (!sags()) return;
+  const auto flow = [this] {
+    double sum = 0.0;
+    for (Eigen::Index i = 0; i < pressure_bar_.size(); ++i) sum += rise_bar_per_s(i, sagged_bar_);
+    return sum;
+  };
+  sagged_bar_ = supply_bar_;
+  if (flow() == 0.0) return;
+  double below = 0.0, above = supply_bar_;
+  for (int k = 0; k < 50; ++k) {
+    sagged_bar_ = 0.5 * (below + above);
+    (sagged_bar_ + sag_s_ * flow() > supply_bar_ ? above : below) = sagged_bar_;
+  }
 }
 
 void Valves::command(std::span<const double> command_bar) noexcept {
@@ -59,13 +91,15 @@ void Valves::command(std::span<const double> command_bar) noexcept {
     if (std::abs(wanted - aim) >= dead_band_bar_) aim = wanted;
   }
   if (lag_.fill_s == 0.0 && exponential()) pressure_bar_ = command_bar_;
+  meet_supply();
 }
 
 void Valves::after(double ahead_s, Eigen::Ref<Eigen::VectorXd> out) const noexcept {
   for (Eigen::Index i = 0; i < pressure_bar_.size(); ++i) {
-    double gap = command_bar_[i] - pressure_bar_[i];
+    const double aim = aim_bar(i, sagged_bar_);
+    double gap = aim - pressure_bar_[i];
     double left_s = ahead_s;
-    const double lag_s = lag_.time_s(command_bar_[i], pressure_bar_[i]);
+    const double lag_s = lag_.time_s(aim, pressure_bar_[i]);
     if (slew_bar_per_s_ > 0.0) {
       const double steep = std::abs(gap) - slew_bar_per_s_ * lag_s;  // to go on a straight line
       if (steep > 0.0) {
@@ -75,14 +109,14 @@ void Valves::after(double ahead_s, Eigen::Ref<Eigen::VectorXd> out) const noexce
       }
     }
     // A line that ends at the command itself (no lag) ends there exactly.
-    out[i] = command_bar_[i] -
-             (left_s > 0.0 ? (lag_s == 0.0 ? 0.0 : gap * std::exp(-left_s / lag_s)) : gap);
+    out[i] = aim - (left_s > 0.0 ? (lag_s == 0.0 ? 0.0 : gap * std::exp(-left_s / lag_s)) : gap);
   }
 }
 
 void Valves::advance(double step_s) noexcept {
   if (!exponential()) {
     after(step_s, pressure_bar_);
+    meet_supply();
     return;
   }
   if (lag_.fill_s == 0.0) {
@@ -99,6 +133,7 @@ void Valves::reset(std::span<const double> pressure_bar) noexcept {
         std::isnan(pressure_bar[i]) ? 0.0 : std::clamp(pressure_bar[i], lowest_bar_, supply_bar_);
   }
   pressure_bar_ = command_bar_;
+  meet_supply();
 }
 
 }  // namespace softarm

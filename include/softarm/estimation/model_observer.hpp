@@ -35,6 +35,10 @@ struct ObserverTiming {
 /// segments share and the base averaged over two seconds. Positions are left out: where an arm is
 /// not quite PCC they cost more than they bring.
 ///
+/// Segments that stretch: bends as of an arm of the present lengths, and a separate filter for e of
+/// every segment, measured from the chord, with an axial force, k_a, beta_a and areas that differ.
+/// tau_A, references and motions have 3n numbers, disturbances and Jacobians 2n.
+///
 /// Up to kJointSegments segments errors have a joint covariance, O(n^3) a frame; longer arms one
 /// small filter a segment, with the arm's joint motion predicted all the same.
 ///

@@ -1,5 +1,5 @@
-// Elements that remember: play operators (Prandtl-Ishlinskii hysteresis) and a Maxwell element.
-// Each is one state a direction, free of allocation and bounded, for simulation, identification and
+// Elements that remember: play operators (Prandtl-Ishlinskii hysteresis), the model of Bouc and Wen,
+// and a Maxwell element. Each is one state a direction, free of allocation and bounded, for simulation, identification and
 // feed-forward alike.
 #pragma once
 
@@ -46,6 +46,43 @@ struct SlipSpring {
     const Eigen::Vector2d along = off / distance;
     return stiffness_nm_per_rad * radius_rad / distance *
            (Eigen::Matrix2d::Identity() - along * along.transpose());
+  }
+};
+
+/// Hysteresis of Bouc and Wen in two directions (Park, Wen and Ang 1986, for any exponent): z follows
+/// the bend u until it saturates at |z| = limit_rad,
+///     dz = du - (|z| / limit_rad)^exponent z_ (shape |du.z_| + (1 - shape) du.z_),  z_ = z / |z|.
+/// Independent of rate and of the directions of the axes. Smooth where slip springs have corners:
+/// along u from rest with exponent 1, z = limit_rad (1 - exp(-u / limit_rad)). A moment k z, k > 0,
+/// dissipates in every closed loop of u where shape >= 1/2.
+struct BoucWen {
+  double limit_rad = 0.1;
+  double exponent = 1.0;  ///< >= 1; the larger, the sharper the knee
+  double shape = 0.5;     ///< beta / (beta + gamma) of the literature, in [1/2, 1]
+
+  /// z after the bend has moved by `du` along a straight line: Runge and Kutta's fourth order, in
+  /// parts of at most limit_rad / (2 + 2 exponent), as z settles within limit_rad / exponent; 1000 at
+  /// most.
+  Eigen::Vector2d step(Eigen::Vector2d z, const Eigen::Vector2d& du) const noexcept {
+    const int parts =
+        1 + static_cast<int>(std::min(999.0, (2.0 + 2.0 * exponent) * du.norm() / limit_rad));
+    const Eigen::Vector2d part = du / parts;
+    for (int i = 0; i < parts; ++i) {
+      const Eigen::Vector2d a = slope(z, part), b = slope(z + 0.5 * a, part);
+      const Eigen::Vector2d c = slope(z + 0.5 * b, part), d = slope(z + c, part);
+      z += (a + 2.0 * b + 2.0 * c + d) / 6.0;
+    }
+    return z;
+  }
+
+ private:
+  Eigen::Vector2d slope(const Eigen::Vector2d& z, const Eigen::Vector2d& du) const noexcept {
+    const double size = z.norm();
+    if (size == 0.0) return du;
+    const double along = du.dot(z) / size;
+    const double yields =
+        std::pow(size / limit_rad, exponent) * (shape * std::abs(along) + (1.0 - shape) * along);
+    return du - yields / size * z;
   }
 };
 

@@ -18,14 +18,18 @@ struct SegmentCorrection {
   /// Horizontal load on the segment's row of G: acceleration along two axes across gravity, as a
   /// fraction of |g|. A base tilted by 10 degrees is 0.17 on every segment.
   Eigen::Vector2d load = Eigen::Vector2d::Zero();
+  /// Of segments that stretch, along e: relative, of k_a, beta_a and the chambers' areas, and an
+  /// unknown axial force, N.
+  double axial_stiffness = 0.0, axial_damping = 0.0, axial_gain = 0.0, axial_force_n = 0.0;
 };
 
 /// The corrected form of (16):
 ///   B u'' + C u' + (1 + damping) D u' + G + H(u, load) + (1 + stiffness) K u
-///     = (1 + gain) A tau_A + disturbance.
+///     = (1 + gain) A tau_A + disturbance,
+/// and the same along e of segments that stretch, with axial_stiffness ... axial_force_n and no H.
 struct ModelCorrection {
   std::array<SegmentCorrection, kMaxSegments> segment;
-  SegmentVector disturbance_nm;  ///< 2n, generalized force in u
+  SegmentVector disturbance_nm;  ///< 2n, generalized force in u, whether segments stretch or not
 };
 
 /// H(u, load): row i of G for horizontal gravity |g| (load_i,x e_x + load_i,y e_y), with e_x, e_y
@@ -42,6 +46,8 @@ class HorizontalLoad {
   /// |g| e_x and |g| e_y, world frame.
   const Eigen::Vector3d& gravity_x_mps2() const noexcept { return arm_x_.gravity_mps2; }
   const Eigen::Vector3d& gravity_y_mps2() const noexcept { return arm_y_.gravity_mps2; }
+  /// Of an arm whose segments stretch and are now so long, m; n numbers.
+  void set_lengths(ConstVectorRef length_m) noexcept;
 
  private:
   ArmParameters arm_x_, arm_y_;

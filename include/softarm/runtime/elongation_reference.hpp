@@ -8,6 +8,7 @@
 #include "softarm/control/reference.hpp"
 #include "softarm/model/arm.hpp"
 #include "softarm/model/dynamics.hpp"
+#include "softarm/model/model_correction.hpp"
 #include "softarm/runtime/settings.hpp"
 
 namespace softarm {
@@ -42,7 +43,10 @@ class ElongationReference {
 
   /// On to `time_s`, with the reference as asked for at and around that time, and e of all three
   /// samples replaced. @param window that of Reference, `lookahead_s` > 0
-  void advance(double time_s, double lookahead_s, ReferenceWindow& window) noexcept;
+  /// @param correction of the arm, or null: what is within reach is that of the corrected arm, with
+  /// the unknown forces where (17) compensates them, too (`forces`)
+  void advance(double time_s, double lookahead_s, ReferenceWindow& window,
+               const ModelCorrection* correction = nullptr, bool forces = false) noexcept;
 
   /// Replaces e of a sample of any time near that advanced to.
   void replace(double time_s, ReferenceSample& sample) const noexcept;
@@ -54,16 +58,19 @@ class ElongationReference {
   static constexpr double kLookahead_s = 2.5e-3;
 
  private:
-  void force_beside_spring(double time_s, const ReferenceSample& sample) noexcept;
+  void force_beside_spring(double time_s, const ReferenceSample& sample,
+                           const ModelCorrection* correction, bool forces) noexcept;
 
   ArmParameters arm_;
   const PressureAllocator& allocator_;
   DynamicsWorkspace workspace_;
+  HorizontalLoad horizontal_;
   double time_s_ = 0.0;
   SegmentScalars e_, rate_, acceleration_;             ///< at time_s_
   SegmentScalars force_, force_before_, force_after_;  ///< N - I
+  SegmentScalars stiffness_, damping_;                 ///< k_a and beta_a, corrected
   ReferenceSample sample_;
-  SegmentVector tau_;
+  SegmentVector tau_, along_x_, along_y_;
   SegmentScalars bias_n_;
 };
 

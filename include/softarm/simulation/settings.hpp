@@ -23,6 +23,8 @@ struct ValveSettings {
   double resolution_bar = 0.0;
   double play_bar = 0.0;       ///< half the backlash between set point and what the valve aims at
   double dead_band_bar = 0.0;  ///< set points nearer to what the valve aims at do nothing
+  /// The common supply falls by this times the sum of the rates at which pressures rise. Needs a lag.
+  double supply_sag_s = 0.0;
 };
 
 /// How the body of an arm differs from a linear spring and damper. Left out, it costs nothing.
@@ -38,10 +40,16 @@ struct MaterialSettings {
   /// arm that was held bent comes back bent.
   double remanence = 0.0;
   double remanence_s = 10.0;
+  /// Hysteresis of the moment by Bouc and Wen (`BoucWen`), beside K: the moment bouc_wen K z.
+  double bouc_wen = 0.0;
+  double bouc_wen_rad = 0.1;  ///< its limit
+  double bouc_wen_exponent = 1.0;
+  double bouc_wen_shape = 0.5;
 
   /// The moment depends on more than u, u' and pressures behind valves.
   bool bends_otherwise() const {
-    return cubic_per_rad2 != 0.0 || stiffening_per_bar != 0.0 || remanence != 0.0;
+    return cubic_per_rad2 != 0.0 || stiffening_per_bar != 0.0 || remanence != 0.0 ||
+           bouc_wen != 0.0;
   }
 };
 
@@ -87,6 +95,9 @@ struct PlantSettings {
   ActuationSettings actuation;
   ValveSettings valves;
   MaterialSettings material;
+  /// Generalized force of every chamber in turn on all segments, beside its own moment: 2n numbers a
+  /// chamber, N m/bar. Empty: none.
+  std::vector<double> cross_nm_per_bar;
   MocapSettings mocap;
   /// At rest. Where a segment has several parts, each takes its share, as under a uniform moment.
   SegmentVector initial_u_rad;

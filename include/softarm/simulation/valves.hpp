@@ -19,6 +19,10 @@ namespace softarm {
 /// limit, if any, first lets the pressure rise (or fall) on a straight line until the lag alone is
 /// slower; a resolution rounds what is commanded; play (backlash) and a dead band lie between that
 /// and what the valve aims at. Dead time is not theirs: see ArmPlant.
+///
+/// A supply that sags, S = supply - sag times the sum of all p' > 0, is held from one call of
+/// `command`, `advance` or `reset` to the next, so that all this stays in closed form: short steps
+/// follow it (first order). A chamber that S cannot fill keeps its pressure (check valve).
 class Valves {
  public:
   /// @param chambers number of valves, >= 0. All start at 0 bar with 0 bar commanded.
@@ -46,18 +50,31 @@ class Valves {
 
   /// Whether all pressures are the same exponential of time, as they are without a slew limit and
   /// with one lag.
-  bool exponential() const noexcept { return slew_bar_per_s_ == 0.0 && lag_.vent_s == lag_.fill_s; }
+  bool exponential() const noexcept {
+    return slew_bar_per_s_ == 0.0 && lag_.vent_s == lag_.fill_s && !sags();
+  }
+  bool sags() const noexcept { return sag_s_ > 0.0; }
+  /// Of the common supply, with all that flows now, bar.
+  double supply_bar() const noexcept { return sagged_bar_; }
 
   const Eigen::VectorXd& pressures_bar() const noexcept { return pressure_bar_; }  ///< real, now
   /// What the valves aim at, within the supply.
   const Eigen::VectorXd& commanded_bar() const noexcept { return command_bar_; }
 
  private:
+  /// What a chamber's pressure goes to from where it is, and how fast it rises there, with a supply
+  /// of `supply_bar`.
+  double aim_bar(Eigen::Index i, double supply_bar) const noexcept;
+  double rise_bar_per_s(Eigen::Index i, double supply_bar) const noexcept;
+  void meet_supply() noexcept;
+
   FillVentLag lag_;
   double supply_bar_;
   double lowest_bar_;
   double slew_bar_per_s_;
   double resolution_bar_, play_bar_, dead_band_bar_;
+  double sag_s_;
+  double sagged_bar_;
   Eigen::VectorXd pressure_bar_;
   Eigen::VectorXd command_bar_;
 };

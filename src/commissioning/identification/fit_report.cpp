@@ -113,6 +113,50 @@ Eigen::VectorXd times(const std::vector<FillVentLag>& lags, double FillVentLag::
   return out;
 }
 
+std::string slip_yaml(const std::vector<SlipSpring>& springs) {
+  Eigen::VectorXd radii(static_cast<Eigen::Index>(springs.size())), stiffness = radii;
+  for (std::size_t k = 0; k < springs.size(); ++k) {
+    radii[static_cast<Eigen::Index>(k)] = springs[k].radius_rad;
+    stiffness[static_cast<Eigen::Index>(k)] = springs[k].stiffness_nm_per_rad;
+  }
+  if (stiffness.size() == 0 || stiffness.isZero(0.0)) return "";
+  return row("slip_radius_rad", radii) + row("slip_stiffness_nm_per_rad", stiffness);
+}
+
+/// What is left of lags that the tick inverts, s: a shorter one tracks better and moves the valves
+/// more (docs/explanation/actuator_inverse.md).
+double lag_left_s(const std::vector<FillVentLag>& lags, double period_s) {
+  constexpr double kShare = 0.1;
+  double longest_s = 0.0;
+  for (const FillVentLag& lag : lags) longest_s = std::max({longest_s, lag.fill_s, lag.vent_s});
+  return std::clamp(kShare * longest_s, 2.0 * period_s, 2.0);
+}
+
+/// Whether filling and venting were identified, which the tick then inverts.
+bool inverts_lags(const ArmHypothesis& arm, const FitChoice& choice) {
+  return (choice.venting || choice.chamber_lags) && !arm.lags.empty();
+}
+
+/// `actuation.inverse`, of the terms that were identified and that it can invert.
+std::string inverse_yaml(const ArmHypothesis& arm, const FitChoice& choice) {
+  std::string text;
+  if (inverts_lags(arm, choice)) {
+    text += row("fill_lag_s", times(arm.lags, &FillVentLag::fill_s));
+    text += row("vent_lag_s", times(arm.lags, &FillVentLag::vent_s));
+  }
+  if (choice.hysteresis) text += slip_yaml(arm.slip_springs);
+  if (choice.stiffening && arm.stiffening_1pbar > 0.0)
+    text += row("stiffening_per_bar", arm.stiffening_1pbar);
+  if (text.empty()) return "";
+  std::string indented = "  inverse:\n";
+  for (std::size_t from = 0; from < text.size();) {
+    const std::size_t end = text.find('\n', from) + 1;
+    indented += "  " + text.substr(from, end - from);
+    from = end;
+  }
+  return indented;
+}
+
 /// The keys of `identification` beyond lag, delay, cubic stiffness and rest; what is off is left out.
 std::string memory_yaml(const ArmHypothesis& arm, bool directions) {
   std::string text = row("load_kg", arm.load_kg);
@@ -123,13 +167,7 @@ std::string memory_yaml(const ArmHypothesis& arm, bool directions) {
   text += row("saturation_1pbar", arm.saturation_1pbar);
   text += row("stiffening_1pbar", arm.stiffening_1pbar);
   text += row("cross_nm_per_bar", arm.cross_nm_per_bar.reshaped());
-  Eigen::VectorXd radii(static_cast<Eigen::Index>(arm.slip_springs.size())), stiffness = radii;
-  for (std::size_t k = 0; k < arm.slip_springs.size(); ++k) {
-    radii[static_cast<Eigen::Index>(k)] = arm.slip_springs[k].radius_rad;
-    stiffness[static_cast<Eigen::Index>(k)] = arm.slip_springs[k].stiffness_nm_per_rad;
-  }
-  if (stiffness.size() > 0 && !stiffness.isZero(0.0))
-    text += row("slip_radius_rad", radii) + row("slip_stiffness_nm_per_rad", stiffness);
+  text += slip_yaml(arm.slip_springs);
   if (arm.remanence.share != 0.0) {
     text += row("remanence", arm.remanence.share) + row("remanence_s", arm.remanence.time_s);
     text += pairs("remanent_u_rad", arm.remanent_rad);
@@ -245,8 +283,10 @@ std::string identified_yaml(const Experiment& experiment, const ArmHypothesis& a
   if (turned) text += gravity_yaml(arm.arm.gravity_mps2, "  ");
   // Chambers that cannot bend the arm to every side, as one identified from few motions, are no
   // actuation of a controller; they predict by `push_nm_per_bar`.
-  if (chambers && (!choice.directions || reaches_every_direction(arm)))
-    text += "\nactuation:\n  chambers:\n" + chambers_yaml(arm, experiment.actuation, "  ");
+  const bool actuates = chambers && (!choice.directions || reaches_every_direction(arm));
+  if (actuates)
+    text += "\nactuation:\n  chambers:\n" + chambers_yaml(arm, experiment.actuation, "  ") +
+            inverse_yaml(arm, choice);
   text += fmt::format(
       "\nidentification:\n  lag_s: {:.6g}\n  delay_s: {:.6g}\n  cubic_nm_per_rad3: {:.6g}\n"
       "  rest_u_rad: [",
@@ -258,6 +298,11 @@ std::string identified_yaml(const Experiment& experiment, const ArmHypothesis& a
   // The controller inverts the lag on what depends on the reference alone.
   if (choice.lag && arm.lags.empty() && arm.lag_s <= 5.0)
     text += fmt::format("\ncontrol:\n  valve_lag_s: {:.6g}\n", arm.lag_s);
+  if (actuates && inverts_lags(arm, choice))
+    text += fmt::format(
+        "\ncontrol:\n  # what actuation.inverse leaves of the lags\n"
+        "  valve_lag_s: {:.6g}\n",
+        lag_left_s(arm.lags, 1.0 / experiment.rate_hz));
   text += "\n# The simulated arm is what it was.\nplant:\n  arm:\n" +
           segments_yaml(experiment.plant.arm, "    ") + plant_too;
   if (turned) text += gravity_yaml(experiment.plant.arm.gravity_mps2, "    ");

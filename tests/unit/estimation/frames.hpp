@@ -49,7 +49,7 @@ inline ArmParameters arm_of(int segments, double length = 0.11) {
   return arm;
 }
 
-/// Frame of an arm with the given u and a base anywhere.
+/// Frame of an arm with the given u, or (u, e) where it stretches, and a base anywhere.
 inline MocapFrame frame_of(const ArmParameters& arm, const Eigen::VectorXd& u,
                            const Eigen::Isometry3d& base = Eigen::Isometry3d::Identity()) {
   MocapFrame frame;
@@ -57,8 +57,10 @@ inline MocapFrame frame_of(const ArmParameters& arm, const Eigen::VectorXd& u,
   Eigen::Isometry3d pose = base;
   frame.body[0] = body_at(pose);
   for (int i = 0; i < arm.size(); ++i) {
-    const Eigen::Vector2d bend = u.segment<2>(2 * i);
-    pose = pose * arc_end(arm.segments[static_cast<std::size_t>(i)].length_m,
+    const int at = arm.segment_dof() * i;
+    const Eigen::Vector2d bend = u.segment<2>(at);
+    const double longer_m = arm.extensible ? u[at + 2] : 0.0;
+    pose = pose * arc_end(arm.segments[static_cast<std::size_t>(i)].length_m + longer_m,
                           std::atan2(bend.y(), bend.x()), bend.norm());
     frame.body[static_cast<std::size_t>(i) + 1] = body_at(pose);
   }

@@ -101,8 +101,10 @@ class SmoothMotion {
     out.acceleration_radps2.resize(dof);
     for (int j = 0; j < dof; ++j) {
       const double rate = 2.0 + 0.3 * (j % 5), phase = 1.1 * j;
-      out.u_rad[j] = amplitude_rad_ * std::sin(rate * t_s + phase);
-      out.velocity_radps[j] = amplitude_rad_ * rate * std::cos(rate * t_s + phase);
+      // Elongations are in m: 9 mm where bends are 0.3 rad.
+      const double size = arm_.extensible && j % 3 == 2 ? 0.03 * amplitude_rad_ : amplitude_rad_;
+      out.u_rad[j] = size * std::sin(rate * t_s + phase);
+      out.velocity_radps[j] = size * rate * std::cos(rate * t_s + phase);
       out.acceleration_radps2[j] = -rate * rate * out.u_rad[j];
     }
     out.source = 1;

@@ -85,6 +85,48 @@ TEST(ElongationReference, WithinReachItGoesToWhatIsAskedForAsASpringAndADamperDo
   }
 }
 
+// Another way to it: an arm that is configured as the corrected one.
+TEST(ElongationReference, ACorrectedArmReachesWhatThatArmReaches) {
+  const ArmParameters arm = stretching_arm(2);
+  const ActuationSettings actuation = four_chambers(2, 0.0);
+  ArmParameters other = arm;
+  ActuationSettings others = actuation;
+  ModelCorrection correction;
+  correction.disturbance_nm.setZero(4);
+  for (std::size_t i = 0; i < 2; ++i) {
+    correction.segment[i] = {.stiffness = 0.2,
+                             .damping = -0.1,
+                             .gain = -0.2,
+                             .axial_stiffness = 0.1 + 0.1 * static_cast<double>(i),
+                             .axial_damping = 0.3,
+                             .axial_gain = -0.2};
+    SegmentParameters& segment = other.segments[i];
+    segment.stiffness_nm_per_rad *= 1.2;
+    segment.damping_nms_per_rad *= 0.9;
+    segment.axial_stiffness_n_per_m *= 1.0 + correction.segment[i].axial_stiffness;
+    segment.axial_damping_ns_per_m *= 1.3;
+    for (Chamber& chamber : others.segments[i]) chamber.gain_nm_per_bar *= 0.8;
+  }
+  const PressureAllocator allocator(actuation, true), other_allocator(others, true);
+  ElongationReference corrected(arm, actuation, allocator);
+  ElongationReference configured(other, others, other_allocator);
+  SegmentVector asked(6);
+  asked << 0.5, 0.2, 0.001, -0.3, 0.1, 0.03;  // the first out of reach, the second within
+  for (ElongationReference* each : {&corrected, &configured}) each->start(0.0, asked);
+  for (int k = 1; k <= 100; ++k) {
+    ReferenceWindow one = at_rest(asked, 0.01), same = one;
+    corrected.advance(0.002 * k, 0.01, one, &correction, true);
+    configured.advance(0.002 * k, 0.01, same);
+    for (const int e : {2, 5}) {
+      EXPECT_NEAR(one.now.u[e], same.now.u[e], 1e-12);
+      EXPECT_NEAR(one.now.velocity[e], same.now.velocity[e], 1e-10);
+    }
+    if (k == 100) {
+      EXPECT_GT(one.now.u[2], 0.003) << "out of reach";
+    }
+  }
+}
+
 TEST(ElongationReference, BendingAsksForMoreAndGetsIt) {
   const ArmParameters arm = stretching_arm(2);
   const ActuationSettings actuation = four_chambers(2, 0.0);

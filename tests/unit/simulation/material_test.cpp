@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "softarm/actuation/chamber_hysteresis.hpp"
+#include "softarm/model/memory.hpp"
 #include "softarm/simulation/arm_plant.hpp"
 #include "unit/simulation/paper_arm.hpp"
 
@@ -77,13 +78,90 @@ TEST(Material, AnArmThatWasHeldBentComesBackBent) {
   }
 }
 
+/// Slow loading and unloading against the integrals of dz/du = 1 -+ ... for exponent 1: loading,
+/// z = r (1 - exp(-u / r)) for any shape; unloading, a straight line for shape 1/2 and
+/// (z_m + r) exp((u - u_m) / r) - r for shape 1.
+TEST(Material, BoucWenFollowsItsClosedForm) {
+  const double part = 0.6, r = 0.15;
+  for (const double shape : {0.5, 1.0}) {
+    PlantSettings settings =
+        weightless({.bouc_wen = part, .bouc_wen_rad = r, .bouc_wen_shape = shape});
+    settings.valves.lag_s = 0.3;  // no overshoot
+    ArmPlant plant(settings);
+    const double k = stiffness(settings);
+    const double top = bend_after(plant, 0.5, 6.0);
+    const double z_top = r * (1.0 - std::exp(-top / r));
+    EXPECT_NEAR(k * (top + part * z_top), gain(settings) * 0.5, 1e-5) << shape;
+    const double back = bend_after(plant, 0.44, 6.0);
+    const double z_back =
+        shape == 0.5 ? z_top + back - top : (z_top + r) * std::exp((back - top) / r) - r;
+    ASSERT_GT(z_back, 0.0);
+    EXPECT_NEAR(k * (back + part * z_back), gain(settings) * 0.44, 1e-5) << shape;
+  }
+}
+
+/// As SlipSpring does where its knee is sharp; and a loop costs energy, however it is walked.
+TEST(Material, BoucWenSaturatesInEveryDirectionAndDissipates) {
+  const BoucWen sharp{.limit_rad = 0.1, .exponent = 20.0};
+  const SlipSpring slips{.radius_rad = 0.1, .stiffness_nm_per_rad = 1.0};
+  for (const double angle : {0.0, 0.7, 2.9}) {
+    const Eigen::Vector2d u = 0.5 * Eigen::Vector2d(std::cos(angle), std::sin(angle));
+    EXPECT_LT((sharp.step({0.0, 0.0}, u) - slips.moment({0.0, 0.0}, u)).norm(), 1e-4);
+  }
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> bend(-0.4, 0.4), shape(0.5, 1.0), exponent(1.0, 4.0);
+  for (int loop = 0; loop < 20; ++loop) {
+    const BoucWen element{.limit_rad = 0.1, .exponent = exponent(random), .shape = shape(random)};
+    std::vector<Eigen::Vector2d> corner(5);
+    for (Eigen::Vector2d& each : corner) each = {bend(random), bend(random)};
+    Eigen::Vector2d z = Eigen::Vector2d::Zero(), u = corner.back();
+    double work = 0.0;
+    for (int turn = 0; turn < 3; ++turn) {
+      work = 0.0;
+      for (const Eigen::Vector2d& to : corner) {
+        const Eigen::Vector2d part = (to - u) / 200.0;
+        for (int i = 0; i < 200; ++i) {
+          const Eigen::Vector2d next = element.step(z, part);
+          work += 0.5 * (z + next).dot(part);
+          z = next;
+          EXPECT_LT(z.norm(), 0.1 * (1.0 + 1e-6));
+        }
+        u = to;
+      }
+    }
+    EXPECT_GT(work, 0.0);
+  }
+}
+
+/// Chambers of segment 2 push on segment 1 as configured, whether segments stretch or not.
+TEST(Plant, ChambersPushOnOtherSegments) {
+  for (const bool stretches : {false, true}) {
+    PlantSettings settings = paper_arm(MassModel::distributed, 2);
+    settings.arm.gravity_mps2.setZero();
+    settings.arm.extensible = stretches;
+    ArmPlant alone(settings);
+    settings.cross_nm_per_bar.assign(4 * 8, 0.0);
+    settings.cross_nm_per_bar[4 * 5 + 0] = 0.2;   // chamber 2 of segment 2, u_x of segment 1
+    settings.cross_nm_per_bar[4 * 5 + 1] = -0.1;  // u_y
+    ArmPlant coupled(settings);
+    const std::vector<double> bar{0.3, 0.0, 0.0, 0.0, 0.0, 0.5, 0.0, 0.0};
+    for (ArmPlant* plant : {&alone, &coupled}) plant->advance(6.0, bar);
+    Eigen::VectorXd expected = alone.u_rad();
+    expected.head<2>() += 0.5 * Eigen::Vector2d(0.2, -0.1) / stiffness(settings);
+    EXPECT_LT((coupled.u_rad() - expected).norm(), 1e-5);
+    settings.cross_nm_per_bar.pop_back();
+    EXPECT_THROW(ArmPlant{settings}, std::invalid_argument);
+  }
+}
+
 TEST(Material, EnergyBalances) {
   PlantSettings settings = paper_arm();
   settings.material = {.hysteresis = 0.2,
                        .cubic_per_rad2 = 0.5,
                        .stiffening_per_bar = 0.1,
                        .remanence = 0.2,
-                       .remanence_s = 2.0};
+                       .remanence_s = 2.0,
+                       .bouc_wen = 0.3};
   settings.valves.lag_s = 0.05;
   settings.valves.vent_lag_s = 0.2;
   settings.initial_u_rad = Eigen::VectorXd::Constant(6, 0.4);

@@ -85,7 +85,42 @@ TEST(Valves, BacklashAndDeadBandLieBetweenSetPointAndAim) {
   EXPECT_EQ(lazy.pressures_bar()[0], 1.06);
 }
 
+/// n chambers that are all to have the full supply fill as one with the lag T + n sag: from
+/// T p' = S - p and S = P - n sag p'. A full one keeps its pressure, one that vents does not count.
+TEST(Valves, ASupplyThatSagsFillsChambersMoreSlowly) {
+  const double lag_s = 0.1, sag_s = 0.05, full_bar = 2.0;
+  double before = 0.0;
+  for (const double step_s : {1e-3, 0.5e-3}) {
+    Valves valves({.lag_s = lag_s, .supply_pressure_bar = full_bar, .supply_sag_s = sag_s}, 5);
+    valves.reset(std::array{0.0, 0.0, 0.0, 1.9, 1.0});
+    EXPECT_EQ(valves.supply_bar(), full_bar);
+    valves.command(std::array{full_bar, full_bar, full_bar, full_bar, 0.0});
+    EXPECT_NEAR(valves.supply_bar(), full_bar * lag_s / (lag_s + 3.0 * sag_s), 1e-12);
+    double worst = 0.0, t = 0.0;
+    for (; t < 0.3; t += step_s) {
+      worst = std::max(worst, std::abs(valves.pressures_bar()[1] -
+                                       full_bar * -std::expm1(-t / (lag_s + 3.0 * sag_s))));
+      EXPECT_EQ(valves.pressures_bar()[3], 1.9);
+      EXPECT_NEAR(valves.pressures_bar()[4], std::exp(-t / lag_s), 1e-12);
+      valves.advance(step_s);
+    }
+    EXPECT_LT(worst, 5e-3);
+    if (before > 0.0) {
+      EXPECT_NEAR(worst, 0.5 * before, 0.05 * before) << "first order";
+    }
+    before = worst;
+    for (; t < 5.0; t += step_s) valves.advance(step_s);
+    EXPECT_NEAR(valves.supply_bar(), full_bar, 1e-6) << "without flow";
+  }
+  Valves stiff({.lag_s = 0.1, .supply_pressure_bar = 2.0, .supply_sag_s = 1e-12}, 1);
+  stiff.command(std::array{1.0});
+  stiff.advance(0.07);
+  EXPECT_NEAR(stiff.pressures_bar()[0], -std::expm1(-0.7), 1e-9);
+}
+
 TEST(Valves, RefuseSettingsThatMeanNothing) {
+  EXPECT_THROW(Valves({.supply_sag_s = 0.1}, 1), std::invalid_argument) << "an infinite flow";
+  EXPECT_THROW(Valves({.lag_s = 0.1, .supply_sag_s = 0.1}, 2, true), std::invalid_argument);
   EXPECT_THROW(Valves({.lag_s = -0.1}, 1), std::invalid_argument);
   EXPECT_THROW(Valves({.lag_s = std::nan("")}, 1), std::invalid_argument);
   EXPECT_THROW(Valves({.lag_s = 0.0, .supply_pressure_bar = -1.0}, 1), std::invalid_argument);

@@ -204,6 +204,45 @@ reference: [{kind: set_point, theta_rad: 0}]
   EXPECT_NEAR(loaded.elongation.remanence.time_s, 40.0, 1e-9);
 }
 
+/// What was identified is what the tick inverts; what was not, and what was configured only, is not.
+TEST(IdentifiedYaml, InvertsTheActuatorsThatWereFound) {
+  const TestFolder folder;
+  const auto base = folder.write("base.yaml", R"(
+name: base
+arm: {segments: 1, length_m: 0.1, mass_kg: 0.1, stiffness_nm_per_rad: 1, damping_nms_per_rad: 0.1}
+actuation: {chambers: {angle_rad: [0, 2*pi/3, 4*pi/3], gain_nm_per_bar: 0.3}, max_pressure_bar: 1}
+control: {kp_nm_per_rad: 0, valve_lag_s: 0.8}
+reference: [{kind: set_point, theta_rad: 0}]
+)");
+  const Experiment experiment = load_experiment(base);
+  ArmHypothesis arm = configured(experiment);
+  arm.lags = {{0.5, 1.4}, {0.6, 1.5}, {0.7, 1.2}};
+  arm.slip_springs = {{0.01, 0.3}, {0.05, 0.2}};
+  arm.stiffening_1pbar = 0.25;
+  FitChoice choice;
+  const auto found = [&] {
+    const auto file = folder.path() / "found.yaml";
+    folder.write("found.yaml", identified_yaml(experiment, arm, choice, "test", base, file));
+    return load_experiment(file);
+  };
+  EXPECT_FALSE(found().actuator_inverse.any()) << "as configured";
+  choice.chamber_lags = choice.hysteresis = choice.stiffening = true;
+  const Experiment all = found();
+  const ActuatorInverseSettings& inverse = all.actuator_inverse;
+  ASSERT_EQ(inverse.fill_lag_s.size(), 3U);
+  for (std::size_t j = 0; j < 3; ++j) {
+    EXPECT_NEAR(inverse.fill_lag_s[j], arm.lags[j].fill_s, 1e-6);
+    EXPECT_NEAR(inverse.vent_lag_s[j], arm.lags[j].vent_s, 1e-6);
+  }
+  ASSERT_EQ(inverse.slip_radius_rad.size(), 2U);
+  EXPECT_NEAR(inverse.slip_radius_rad[1], 0.05, 1e-9);
+  EXPECT_NEAR(inverse.slip_stiffness_nm_per_rad[1], 0.2, 1e-9);
+  EXPECT_NEAR(inverse.stiffening_per_bar, 0.25, 1e-9);
+  EXPECT_NEAR(all.control.valve_lag_s, 0.15, 1e-9) << "a tenth of the longest lag";
+  arm.stiffening_1pbar = -0.1;  // what no pressure does is not inverted
+  EXPECT_EQ(found().actuator_inverse.stiffening_per_bar, 0.0);
+}
+
 TEST(TipPrediction, ChordsOfConstantCurvatureGiveTheTip) {
   MotionRecord record;
   record.time_s = Eigen::VectorXd::LinSpaced(50, 0.0, 5.0);
