@@ -65,6 +65,9 @@ struct ModelObserver::State {
   BaseAverage base_average;
   InnovationMonitor monitor;
   SegmentVector scale_nm;
+  /// What a payload of one standard deviation makes of stiffness, damping and gain, all relative to
+  /// the weight: one number a segment.
+  std::vector<double> payload_part;
 
   std::optional<ErrorCovariance<kJoint>> joint_;
   GroupModel<2 * kJoint> joint_model_;
