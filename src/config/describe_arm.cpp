@@ -121,6 +121,9 @@ static void describe(Keys& key, ModelObserverSettings& it) {
   KEY(learn_parameters, "stiffness, damping, gain and a horizontal load of every segment, on line");
   KEY(parameter_deviation, above(0, 1),
       "standard deviation of the parameters before anything was learnt, relative");
+  KEY(payload_deviation, from(0, 10),
+      "standard deviation of a mass at the tip before anything was learnt, over the arm's mass: "
+      "stiffness, damping and gain of all segments are then likely to be wrong together");
   KEY(parameter_drift_per_sqrt_s, from(0, 1), "random walk of the parameters, relative");
   KEY(disturbance_drift_per_sqrt_s, above(0, 10),
       "random walk of the disturbance over the torque that bends a segment by 1 rad, at least");

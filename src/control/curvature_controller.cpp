@@ -90,6 +90,11 @@ double wrapped(double angle) {
   return rest <= -std::numbers::pi ? rest + 2.0 * std::numbers::pi : rest;
 }
 
+/// Largest factor by which a gain below what is configured raises K_P and K_D. A smaller one costs
+/// accuracy while the parameters settle; a larger one uses up the loop's gain margin where the gain
+/// overshoots in the first second, which loses arms with a payload and dead time.
+constexpr double kLargestGainFactor = 3.0;
+
 }  // namespace
 
 CurvatureController::CurvatureController(const ArmParameters& arm,
@@ -157,7 +162,7 @@ void CurvatureController::compute(ConstVectorRef u, ConstVectorRef velocity,
   if (settings_.valve_lag_s > 0.0 && reference.interval_s > 0.0) add_lag_inverse(reference, out);
   if (integrates_) out.tau_u_nm += integral_;
   if (correction != nullptr && settings_.disturbance != DisturbanceRejection::none)
-    correct(*correction, u, reference, out);
+    correct(*correction, u, velocity, reference, out);
   solve_actuation(arm_, u, out.tau_u_nm, out.tau_actuation_nm);
   if (arm_.actuation == ActuationModel::couple) {
     for (Eigen::Index i = 0; i < u.size(); i += 2) {
@@ -264,7 +269,8 @@ void CurvatureController::add_correction(const ModelCorrection& correction, Cons
 }
 
 void CurvatureController::correct(const ModelCorrection& correction, ConstVectorRef u,
-                                  const ReferenceWindow& reference, ControlOutput& out) noexcept {
+                                  ConstVectorRef velocity, const ReferenceWindow& reference,
+                                  ControlOutput& out) noexcept {
   add_correction(correction, u, reference.now, out.tau_u_nm);
   if (settings_.valve_lag_s > 0.0 && reference.interval_s > 0.0) {
     before_.setZero();
@@ -277,9 +283,16 @@ void CurvatureController::correct(const ModelCorrection& correction, ConstVector
   const int width = arm_.segment_dof();
   for (int i = 0; i < arm_.size(); ++i) {
     const SegmentCorrection& off = correction.segment[static_cast<std::size_t>(i)];
-    auto bend = out.tau_u_nm.segment<2>(width * i);
-    if (cancels) bend -= correction.disturbance_nm.segment<2>(2 * i);
-    bend /= 1.0 + off.gain;
+    const double factor = 1.0 / (1.0 + off.gain);
+    auto bend = out.tau_u_nm.segment<2>(width * i).array();
+    if (cancels) bend -= correction.disturbance_nm.segment<2>(2 * i).array();
+    bend *= factor;
+    if (factor > kLargestGainFactor && settings_.coordinates == ControlCoordinates::u) {
+      const auto at = [=](const auto& v) { return v.template segment<2>(width * i).array(); };
+      const ReferenceSample& r = reference.now;
+      bend -= (factor - kLargestGainFactor) *
+              (at(kp_) * (at(r.u) - at(u)) + at(kd_) * (at(r.velocity) - at(velocity)));
+    }
     if (width == 2) continue;
     double& along = out.tau_u_nm[3 * i + 2];
     if (cancels) along -= off.axial_force_n;

@@ -95,6 +95,13 @@ class ErrorCovariance {
     }
     own += covariance;
   }
+  /// Adds to the parameters' covariance what an error along `direction` (5g) with a standard
+  /// deviation of 1 makes of it.
+  template <class Direction>
+  void add_to_parameters(const Direction& direction) noexcept {
+    const int count = parameter_count();
+    P_.bottomRightCorner(count, count).noalias() += direction * direction.transpose();
+  }
   void add_to_disturbance(const Vector& variance) noexcept {
     P_.diagonal().segment(2 * dof_, dof_) += variance;
   }

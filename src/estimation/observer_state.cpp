@@ -9,6 +9,7 @@
 
 #include "softarm/base/time.hpp"
 #include "softarm/model/coordinates.hpp"
+#include "softarm/model/kinematics.hpp"
 
 namespace softarm {
 namespace {
@@ -25,6 +26,15 @@ constexpr double kUnseenVariance_rad2 = 1e4;
 /// Corrections beyond these are no corrections. As the weight is their scale, 150 g on the end of a
 /// segment of 100 g with 30 % less gain is one of -0.82.
 constexpr double kLeastCorrection = -0.9, kLargestCorrection = 2.0, kLargestLoad = 1.0;
+/// A mass at the tip has more inertia for its weight than the arm: along a motion that shows as a
+/// spring which is softer still, down to one of less than zero.
+constexpr double kLeastStiffness = -1.5;
+
+double total_mass_kg(const ArmParameters& arm) {
+  double sum = 0.0;
+  for (const SegmentParameters& segment : arm.segments) sum += segment.mass_kg;
+  return sum;
+}
 
 SegmentVector torque_scale(const ArmParameters& arm) {
   SegmentVector scale(arm.dof());
@@ -36,6 +46,37 @@ SegmentVector torque_scale(const ArmParameters& arm) {
   }
   const double largest = scale.maxCoeff();
   return scale.cwiseMax(largest > 0.0 ? 1e-3 * largest : 1.0);
+}
+
+/// The weight is what stiffness, damping and gain are relative to: with a mass of payload_kg at the
+/// tip a segment carries (1 + s) times of what is configured, and the three come out at 1 / (1 + s)
+/// of it. s from the moments of both in slightly bent poses.
+std::vector<double> payload_parts(const ArmParameters& arm, double payload_kg) {
+  constexpr double kBend_rad = 0.1;
+  constexpr DynamicsTerms kGravity{false, false, true};
+  const int n = arm.size();
+  std::vector<double> parts(static_cast<std::size_t>(n), 0.0);
+  if (payload_kg <= 0.0) return parts;
+  DynamicsWorkspace workspace(arm);
+  SegmentVector u(2 * n), own(2 * n);
+  Eigen::Matrix3Xd jacobian(3, 2 * n);
+  Eigen::VectorXd shared = Eigen::VectorXd::Zero(n), square = Eigen::VectorXd::Zero(n);
+  for (int axis = 0; axis < 2; ++axis) {
+    for (int j = 0; j < 2 * n; ++j) u[j] = j % 2 == axis ? kBend_rad : 0.0;
+    inverse_dynamics(arm, workspace, u, u, u, u, kGravity, own);
+    tip_jacobian(arm, u, jacobian);
+    for (int i = 0; i < n; ++i) {
+      const Eigen::Vector2d hung =
+          -payload_kg * jacobian.middleCols<2>(2 * i).transpose() * arm.gravity_mps2;
+      shared[i] += hung.dot(own.segment<2>(2 * i));
+      square[i] += own.segment<2>(2 * i).squaredNorm();
+    }
+  }
+  for (int i = 0; i < n; ++i) {
+    const double s = square[i] > 0.0 ? std::max(0.0, shared[i] / square[i]) : 0.0;
+    parts[static_cast<std::size_t>(i)] = -s / (1.0 + s);
+  }
+  return parts;
 }
 
 void require(bool holds, const char* what, double value) {
@@ -68,7 +109,8 @@ ModelObserver::State::State(const ArmParameters& arm_, const EstimationSettings&
       base_average(noise_.front().orientation_rad),
       monitor(torque_scale(arm), settings.disturbance_drift_per_sqrt_s,
               settings.largest_disturbance_drift_per_sqrt_s),
-      scale_nm(torque_scale(arm)) {
+      scale_nm(torque_scale(arm)),
+      payload_part(payload_parts(arm, settings.payload_deviation * total_mass_kg(arm))) {
   require(settings.parameter_deviation >= 0.0, "parameter_deviation >= 0",
           settings.parameter_deviation);
   require(settings.disturbance_drift_per_sqrt_s > 0.0, "disturbance_drift_per_sqrt_s > 0",
@@ -111,9 +153,16 @@ void ModelObserver::State::forget_parameters() noexcept {
   correction.disturbance_nm.setZero(arm.dof());
   if (axial) axial->forget_parameters();
   const double sigma = settings.learn_parameters ? settings.parameter_deviation : 0.0;
-  for_groups([&](auto& errors, auto&, int) {
+  for_groups([&](auto& errors, auto&, int first) {
     using Vector = typename std::remove_cvref_t<decltype(errors)>::Vector;
     errors.reset(1.0, 1.0, Vector::Ones(errors.velocity()), sigma * sigma);
+    if (!settings.learn_parameters || settings.payload_deviation == 0.0) return true;
+    const int segments = errors.velocity() / 2;
+    Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, 5 * kJoint, 1> payload(5 * segments);
+    payload.setZero();
+    for (int i = 0; i < segments; ++i)
+      payload.segment<3>(5 * i).setConstant(payload_part[static_cast<std::size_t>(first + i)]);
+    errors.add_to_parameters(payload);
     return true;
   });
 }
@@ -353,7 +402,7 @@ void ModelObserver::State::limit_corrections() noexcept {
   };
   for (int i = 0; i < arm.size(); ++i) {
     SegmentCorrection& off = correction.segment[static_cast<std::size_t>(i)];
-    limit(off.stiffness, kLeastCorrection, kLargestCorrection);
+    limit(off.stiffness, kLeastStiffness, kLargestCorrection);
     limit(off.damping, kLeastCorrection, kLargestCorrection);
     limit(off.gain, kLeastCorrection, kLargestCorrection);
     limit(off.load.x(), -kLargestLoad, kLargestLoad);

@@ -68,6 +68,9 @@ struct ModelObserver::State {
   BaseAverage base_average;
   InnovationMonitor monitor;
   SegmentVector scale_nm;
+  /// What a payload of one standard deviation makes of stiffness, damping and gain, all relative to
+  /// the weight: one number a segment.
+  std::vector<double> payload_part;
 
   std::unique_ptr<AxialObserver> axial;  ///< where segments stretch
   SegmentScalars rest_length_m, length_m, rate_mps;

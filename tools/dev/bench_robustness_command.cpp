@@ -21,7 +21,7 @@ struct RobustnessOptions {
   std::string scene, law;
   bool json = false, processes = false;
   int draws = 0;
-  std::uint64_t seed = 1;
+  std::uint64_t seed = 1, first = 1;
 };
 
 Experiment shipped_config(const std::string& name) {
@@ -48,7 +48,7 @@ void search(const RobustnessOptions& options) {
   const DrawLimits limits;
   Progress progress(true);
   const std::vector<Draw> draws =
-      run_draws(limits, options.draws, options.seed, shipped_config, [&](int done) {
+      run_draws(limits, options.first, options.draws, options.seed, shipped_config, [&](int done) {
         if (progress.due()) progress.update(fmt::format("{} of {}", done, options.draws));
       });
   const std::string text = options.json ? draws_json(limits, draws) : draws_table(limits, draws);
@@ -116,6 +116,9 @@ void add_bench_robustness_command(CLI::App& group) {
       ->check(CLI::Range(1, 100'000))
       ->excludes(processes);
   command->add_option("--seed", options->seed, "of the arms drawn")->check(CLI::NonNegativeNumber);
+  command->add_option("--first", options->first, "number of the first of the arms drawn")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
   command->callback([options, command] {
     if (options->processes && command->count("--seeds") == 0) options->seeds = 1;
     options->draws > 0 ? search(*options) : measure_robustness(*options);

@@ -59,7 +59,7 @@ class CurvatureController {
   void add_lag_inverse(const ReferenceWindow& reference, ControlOutput& out) noexcept;
   void add_correction(const ModelCorrection& correction, ConstVectorRef u,
                       const ReferenceSample& reference, SegmentVector& force_nm) noexcept;
-  void correct(const ModelCorrection& correction, ConstVectorRef u,
+  void correct(const ModelCorrection& correction, ConstVectorRef u, ConstVectorRef velocity,
                const ReferenceWindow& reference, ControlOutput& out) noexcept;
 
   ArmParameters arm_;

@@ -21,6 +21,7 @@ enum class ObserverKind {
 struct ModelObserverSettings {
   bool learn_parameters = true;
   double parameter_deviation = 0.2;
+  double payload_deviation = 0.0;
   double parameter_drift_per_sqrt_s = 5e-4;
   double disturbance_drift_per_sqrt_s = 3e-3;
   double largest_disturbance_drift_per_sqrt_s = 0.045;

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 
+#include "dev/bench/robustness_draws.hpp"
 #include "dev/bench/robustness_scenes.hpp"
 #include "softarm/config/load.hpp"
 
@@ -38,6 +39,20 @@ TEST(Robustness, AFewArmsThatAreNotTheirModel) {
 TEST(RobustnessSlow, EveryRowForFiveSeeds) {
   for (const RobustnessScene& scene : robustness_scenes())
     if (scene.bound_mrad > 0.0) holds(scene, 5);
+}
+
+// With 110 to 150 g at the tip and 10 to 20 ms of dead time. Gains that may overshoot in the first
+// second, or stiffnesses that may not fall below -0.9, lose one or the other of them.
+TEST(RobustnessSlow, HeavyArmsOfTheRandomSearch) {
+  const DrawLimits limits;
+  for (const std::uint64_t number : {19, 60, 70, 137, 155, 223, 242, 317}) {
+    const RobustnessScene scene = drawn_scene(limits, 1, number);
+    const Experiment experiment =
+        robustness_experiment(scene, RobustnessLaw::observer_parameters, shipped_experiment);
+    const RobustnessTrial trial = run(experiment, scene, number);
+    EXPECT_TRUE(trial.stayed_active) << number;
+    EXPECT_LE(trial.u_rms_rad, limits.good_rad) << number;
+  }
 }
 
 }  // namespace

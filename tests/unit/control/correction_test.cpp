@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <cmath>
 
 #include "softarm/control/curvature_controller.hpp"
@@ -101,6 +102,27 @@ TEST(Correction, SettingsSayWhatIsUsed) {
   no_disturbance.disturbance_nm.setZero();
   EXPECT_EQ(torque(model_only, &other.correction), torque(cancel, &no_disturbance));
   EXPECT_NE(torque(cancel, &other.correction), torque(model_only, &other.correction));
+}
+
+TEST(Correction, AWeakGainRaisesTheFeedbackUpToThreefoldAndTheRestInFull) {
+  const ArmParameters arm = test::paper_arm(1);
+  const Eigen::Vector2d u(0.3, 0.1), velocity(0.4, -0.2), zero(0.0, 0.0);
+  const Eigen::Vector2d ahead = u + Eigen::Vector2d(0.02, -0.01);
+  const auto torque = [&](double kp, double kd, const ModelCorrection* correction) -> VectorXd {
+    CurvatureController controller(arm, test::gains(1, kp, kd));
+    ControlOutput out;
+    controller.compute(u, velocity, test::at(ahead, zero, zero), out, correction);
+    return out.tau_u_nm;
+  };
+  const VectorXd feedback = 0.8 * (ahead - u) - 0.03 * velocity;
+  const VectorXd model = torque(0.0, 0.0, nullptr);
+  for (const double gain : {0.4, 0.0, -0.5, -0.6, -0.8, -0.9}) {
+    ModelCorrection correction;
+    correction.disturbance_nm = VectorXd::Zero(2);
+    correction.segment[0].gain = gain;
+    const VectorXd expected = model / (1.0 + gain) + std::min(1.0 / (1.0 + gain), 3.0) * feedback;
+    EXPECT_LT((torque(0.8, 0.03, &correction) - expected).norm(), 1e-12) << gain;
+  }
 }
 
 TEST(Correction, TheLagInverseCountsItIn) {

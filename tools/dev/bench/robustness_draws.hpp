@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -24,9 +25,11 @@ struct Draw {
   std::uint64_t number = 0;
   RobustnessScene scene;
   RobustnessTrial trial;
-  /// Of those that did not succeed: the growth of a disturbance on this arm by the method of softarm
-  /// check (1/s), negative where that finds the loop stable.
-  double growth_1ps = 0.0;
+  /// Of those that did not succeed, and of every tenth of all: the growth of a disturbance on this arm
+  /// by the method of softarm check (1/s), negative where that finds the loop stable.
+  std::optional<double> growth_1ps;
+
+  bool foreseen_unstable() const { return growth_1ps && !(*growth_1ps < 0.0); }
 
   bool stable() const { return trial.stayed_active && trial.u_rms_rad < 0.1; }
   bool good(const DrawLimits& limits) const {
@@ -37,8 +40,9 @@ struct Draw {
 /// Arm `number` of the search `seed`.
 RobustnessScene drawn_scene(const DrawLimits& limits, std::uint64_t seed, std::uint64_t number);
 
-/// Every arm under the observer with parameters.
-std::vector<Draw> run_draws(const DrawLimits& limits, int draws, std::uint64_t seed,
+/// Arms `first`, first + 1, ..., each under the observer with parameters.
+std::vector<Draw> run_draws(const DrawLimits& limits, std::uint64_t first, int draws,
+                            std::uint64_t seed,
                             const std::function<Experiment(const std::string&)>& config,
                             const std::function<void(int)>& progress);
 
