@@ -1,6 +1,4 @@
 // The declarations of the simulated arm.
-#include <algorithm>
-
 #include "config/describe.hpp"
 
 namespace softarm {
@@ -150,10 +148,6 @@ void describe_plant(Keys& key, Experiment& experiment) {
   KEY(cross_nm_per_bar, from(-1e4, 1e4).one_or_each(),
       "of every chamber in turn, 2n numbers: generalized force in u on all segments beside its "
       "own");
-  // None, whatever number of chambers a plant may be given later.
-  if (std::all_of(it.cross_nm_per_bar.begin(), it.cross_nm_per_bar.end(),
-                  [](double each) { return each == 0.0; }))
-    it.cross_nm_per_bar.clear();
   KEY(mocap, "simulated motion capture");
   key.section({"initial", "where the arm starts, at rest"}, [&] {
     std::vector<double> u(it.initial_u_rad.begin(), it.initial_u_rad.end());

@@ -5,6 +5,7 @@
 
 #include "softarm/base/time.hpp"
 #include "softarm/model/actuation_matrix.hpp"
+#include "softarm/model/coordinates.hpp"
 
 namespace softarm {
 
@@ -75,8 +76,7 @@ ArmPredictor::ArmPredictor(const ArmParameters& arm)
 
 void ArmPredictor::set_stretch(ConstVectorRef length_m, const SegmentVector& coupling_nm) noexcept {
   coupling_ = coupling_nm;
-  for (int i = 0; i < arm_.size(); ++i)
-    arm_.segments[static_cast<std::size_t>(i)].length_m = length_m[i];
+  set_lengths(arm_, length_m);
   horizontal_.set_lengths(length_m);
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimation/correction_limits.hpp"
 #include "softarm/base/time.hpp"
 
 namespace softarm {
@@ -13,8 +14,6 @@ constexpr double kStep_s = 2.5e-3;
 constexpr double kLeastNoise_m = 2e-5;
 /// Of the scale, when it starts.
 constexpr double kFirstForce = 0.1;
-/// As those of the bends.
-constexpr double kLeastCorrection = -0.9, kLargestCorrection = 2.0;
 
 /// Of every segment that stretches, an axial force that counts, N: what bends a section by one rad,
 /// as a force along it, sqrt(k k_a).
@@ -92,6 +91,11 @@ double AxialObserver::stiffness(std::size_t i) const noexcept {
 double AxialObserver::damping(std::size_t i) const noexcept {
   return (1.0 + error_[i][3]) * arm_.segments[i].axial_damping_ns_per_m;
 }
+double AxialObserver::rate_mps(std::size_t i, const Motion& motion) const noexcept {
+  if (arm_.segments[i].constant_length) return 0.0;
+  const auto k = static_cast<Eigen::Index>(i);
+  return (push_n(i, motion.force.tau_nm[k]) - stiffness(i) * motion.e_m[k]) / damping(i);
+}
 
 /// Exact for a force that is constant within a step.
 void AxialObserver::advance(std::int64_t time_ns, Motion& motion) noexcept {
@@ -158,17 +162,11 @@ bool AxialObserver::advance(std::int64_t time_ns, ConstVectorRef u_rad,
   for (int i = 0; i < arm_.size(); ++i) {
     const auto k = static_cast<std::size_t>(i);
     q_.segment<3>(3 * i) << u_rad.segment<2>(2 * i), now_.e_m[i];
-    const double rate =
-        arm_.segments[k].constant_length
-            ? 0.0
-            : (push_n(k, now_.force.tau_nm[i]) - stiffness(k) * now_.e_m[i]) / damping(k);
-    velocity_.segment<3>(3 * i) << velocity_radps.segment<2>(2 * i), rate;
+    velocity_.segment<3>(3 * i) << velocity_radps.segment<2>(2 * i), rate_mps(k, now_);
   }
   row(q_, velocity_, acceleration_, beside_n_);
-  for (int i = 0; i < arm_.size(); ++i) {
-    SegmentParameters& segment = bends_.segments[static_cast<std::size_t>(i)];
-    segment.length_m = arm_.segments[static_cast<std::size_t>(i)].length_m + now_.e_m[i];
-  }
+  const SegmentScalars present_m = lengths(arm_) + now_.e_m;
+  set_lengths(bends_, present_m);
   coupling_nm_ = bend_part(arm_, force_);
   inverse_dynamics(bends_, bends_workspace_, u_rad, velocity_radps, velocity_radps,
                    bend_part(arm_, acceleration_), {}, bends_force_);
@@ -198,12 +196,7 @@ bool AxialObserver::correct(const CurvatureEstimate& estimate, double since_s,
     P_[k] = (kept * P_[k] * kept.transpose() + variance_m2 * gain * gain.transpose()).eval();
     now_.e_m[i] += gain[0] * innovation_m;
     error_[k].tail<4>() += innovation_m * gain.tail<4>();
-    for (Eigen::Index j = 2; j < kStates; ++j) {
-      constexpr double kNear = 0.95;
-      double& value = error_[k][j];
-      at_limit_ |= !(value > kNear * kLeastCorrection && value < kNear * kLargestCorrection);
-      value = std::clamp(value, kLeastCorrection, kLargestCorrection);
-    }
+    for (Eigen::Index j = 2; j < kStates; ++j) at_limit_ |= limit_correction(error_[k][j]);
   }
   if (seen == 0) return true;
   for (int i = 0; i < arm_.size(); ++i) forces_[i] = error_[static_cast<std::size_t>(i)][1];
@@ -212,16 +205,13 @@ bool AxialObserver::correct(const CurvatureEstimate& estimate, double since_s,
 }
 
 void AxialObserver::predict(std::int64_t time_ns, SegmentScalars& e_m,
-                            SegmentScalars& rate_mps) noexcept {
+                            SegmentScalars& rates_mps) noexcept {
   ahead_ = now_;
   advance(time_ns, ahead_);
   e_m = ahead_.e_m;
-  rate_mps.setZero(arm_.size());
-  for (int i = 0; i < arm_.size(); ++i) {
-    const auto k = static_cast<std::size_t>(i);
-    if (arm_.segments[k].constant_length) continue;
-    rate_mps[i] = (push_n(k, ahead_.force.tau_nm[i]) - stiffness(k) * e_m[i]) / damping(k);
-  }
+  rates_mps.resize(arm_.size());
+  for (int i = 0; i < arm_.size(); ++i)
+    rates_mps[i] = rate_mps(static_cast<std::size_t>(i), ahead_);
 }
 
 void AxialObserver::put(ModelCorrection& correction) const noexcept {

@@ -54,7 +54,7 @@ class AxialObserver {
   bool correct(const CurvatureEstimate& estimate, double since_s, bool learn) noexcept;
 
   /// e (m) and e' (m/s), n each, at `time_ns` under the commands known by then.
-  void predict(std::int64_t time_ns, SegmentScalars& e_m, SegmentScalars& rate_mps) noexcept;
+  void predict(std::int64_t time_ns, SegmentScalars& e_m, SegmentScalars& rates_mps) noexcept;
 
   /// At the newest frame, m.
   const SegmentScalars& e_m() const noexcept { return now_.e_m; }
@@ -78,6 +78,7 @@ class AxialObserver {
   double push_n(std::size_t i, double force_n) const noexcept;
   double stiffness(std::size_t i) const noexcept;
   double damping(std::size_t i) const noexcept;
+  double rate_mps(std::size_t i, const Motion& motion) const noexcept;
   void propagate(double step_s, const KnownMotion* reference) noexcept;
 
   ArmParameters arm_;

@@ -122,8 +122,8 @@ void ModelObserver::predict(std::int64_t now_ns, std::int64_t act_ns,
     out.velocity_radps = last.velocity;
   }
   if (s.axial) {
-    s.axial->predict(time_ns, s.length_m, s.rate_mps);
-    out.u_rad = coordinates(s.whole, out.u_rad, s.length_m);
+    s.axial->predict(time_ns, s.e_m, s.rate_mps);
+    out.u_rad = coordinates(s.whole, out.u_rad, s.e_m);
     out.velocity_radps = coordinates(s.whole, out.velocity_radps, s.rate_mps);
   }
   for (int i = 0; i < n; ++i) {

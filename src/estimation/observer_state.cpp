@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <type_traits>
 
+#include "estimation/correction_limits.hpp"
 #include "softarm/base/time.hpp"
 #include "softarm/model/coordinates.hpp"
 #include "softarm/model/kinematics.hpp"
@@ -23,9 +24,7 @@ constexpr double kLeastNoise_rad = 1e-4;
 constexpr double kFirstSpeed_radps = 0.5, kFirstDisturbance = 0.1;
 /// Of a segment that a frame does not show.
 constexpr double kUnseenVariance_rad2 = 1e4;
-/// Corrections beyond these are no corrections. As the weight is their scale, 150 g on the end of a
-/// segment of 100 g with 30 % less gain is one of -0.82.
-constexpr double kLeastCorrection = -0.9, kLargestCorrection = 2.0, kLargestLoad = 1.0;
+constexpr double kLargestLoad = 1.0;
 /// A mass at the tip has more inertia for its weight than the arm: along a motion that shows as a
 /// spring which is softer still, down to one of less than zero.
 constexpr double kLeastStiffness = -1.5;
@@ -121,9 +120,6 @@ ModelObserver::State::State(const ArmParameters& arm_, const EstimationSettings&
   const int n = arm.size();
   if (arm_.extensible) {
     whole = arm_;
-    rest_length_m.resize(n);
-    for (int i = 0; i < n; ++i)
-      rest_length_m[i] = arm.segments[static_cast<std::size_t>(i)].length_m;
     axial = std::make_unique<AxialObserver>(arm_, settings, history.size(), timing.valve_lag_s);
   }
   if (n <= kJoint) {
@@ -169,9 +165,8 @@ void ModelObserver::State::forget_parameters() noexcept {
 
 /// With e held, what bends see of a segment that stretches is its length.
 void ModelObserver::State::take_lengths() noexcept {
-  length_m = rest_length_m + axial->e_m();
-  for (int i = 0; i < arm.size(); ++i)
-    arm.segments[static_cast<std::size_t>(i)].length_m = length_m[i];
+  const SegmentScalars length_m = lengths(whole) + axial->e_m();
+  set_lengths(arm, length_m);
   predictor.set_stretch(length_m, axial->coupling_nm());
   axial->put(correction);
   at_limit |= axial->at_limit();
@@ -394,19 +389,13 @@ bool ModelObserver::State::correct_group(ErrorCovariance<k>& errors, int first,
 
 void ModelObserver::State::limit_corrections() noexcept {
   at_limit = false;
-  // What is pushed against a limit stays near it, not on it.
-  constexpr double kNear = 0.95;
-  const auto limit = [this](double& value, double low, double high) {
-    at_limit |= !(value > kNear * low && value < kNear * high);
-    value = std::clamp(value, low, high);
-  };
   for (int i = 0; i < arm.size(); ++i) {
     SegmentCorrection& off = correction.segment[static_cast<std::size_t>(i)];
-    limit(off.stiffness, kLeastStiffness, kLargestCorrection);
-    limit(off.damping, kLeastCorrection, kLargestCorrection);
-    limit(off.gain, kLeastCorrection, kLargestCorrection);
-    limit(off.load.x(), -kLargestLoad, kLargestLoad);
-    limit(off.load.y(), -kLargestLoad, kLargestLoad);
+    at_limit |= limit_correction(off.stiffness, kLeastStiffness);
+    at_limit |= limit_correction(off.damping);
+    at_limit |= limit_correction(off.gain);
+    at_limit |= limit_correction(off.load.x(), -kLargestLoad, kLargestLoad);
+    at_limit |= limit_correction(off.load.y(), -kLargestLoad, kLargestLoad);
   }
 }
 

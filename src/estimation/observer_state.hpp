@@ -73,9 +73,9 @@ struct ModelObserver::State {
   std::vector<double> payload_part;
 
   std::unique_ptr<AxialObserver> axial;  ///< where segments stretch
-  SegmentScalars rest_length_m, length_m, rate_mps;
-  ArmParameters whole;  ///< extensible, for splitting and joining coordinates
-  KnownMotion bends;    ///< the bends of a reference
+  SegmentScalars e_m, rate_mps;          ///< predicted
+  ArmParameters whole;                   ///< extensible, for splitting and joining coordinates
+  KnownMotion bends;                     ///< the bends of a reference
 
   std::optional<ErrorCovariance<kJoint>> joint_;
   GroupModel<2 * kJoint> joint_model_;

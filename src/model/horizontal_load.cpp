@@ -1,5 +1,6 @@
 #include <Eigen/Geometry>
 
+#include "softarm/model/coordinates.hpp"
 #include "softarm/model/model_correction.hpp"
 
 namespace softarm {
@@ -17,9 +18,8 @@ HorizontalLoad::HorizontalLoad(const ArmParameters& arm) : arm_x_(arm), arm_y_(a
 }
 
 void HorizontalLoad::set_lengths(ConstVectorRef length_m) noexcept {
-  for (Eigen::Index i = 0; i < length_m.size(); ++i)
-    for (ArmParameters* arm : {&arm_x_, &arm_y_})
-      arm->segments[static_cast<std::size_t>(i)].length_m = length_m[i];
+  softarm::set_lengths(arm_x_, length_m);
+  softarm::set_lengths(arm_y_, length_m);
 }
 
 void HorizontalLoad::rows(ConstVectorRef u, DynamicsWorkspace& workspace, VectorRef along_x,

@@ -59,7 +59,7 @@ const PlantSettings& checked(const PlantSettings& settings) {
          "a limit > 0, an exponent >= 1 and a shape in [1/2, 1] of material.bouc_wen", "others");
   const std::size_t forces = 2 * settings.arm.segments.size() *
                              static_cast<std::size_t>(chamber_count(settings.actuation));
-  expect(settings.cross_nm_per_bar.empty() || settings.cross_nm_per_bar.size() == forces,
+  expect(!settings.crosses() || settings.cross_nm_per_bar.size() == forces,
          std::to_string(forces) + " numbers in cross_nm_per_bar",
          std::to_string(settings.cross_nm_per_bar.size()));
   expect(settings.arm.gravity_mps2.allFinite(), "finite gravity", "another");
@@ -96,13 +96,11 @@ const PlantSettings& checked(const PlantSettings& settings) {
 /// From pressures to generalized forces, with what chambers do to other segments.
 Eigen::MatrixXd forces_of_chambers(const PlantSettings& settings) {
   Eigen::MatrixXd map = input_map(settings.actuation, settings.arm.extensible);
-  const int width = settings.arm.segment_dof();
-  for (std::size_t k = 0; k < settings.cross_nm_per_bar.size(); ++k) {
-    const auto n2 = 2 * settings.arm.segments.size();
-    const auto row = static_cast<int>(k % n2);
-    map(width * (row / 2) + row % 2, static_cast<Eigen::Index>(k / n2)) +=
-        settings.cross_nm_per_bar[k];
-  }
+  if (!settings.crosses()) return map;
+  const int n = settings.arm.size(), width = settings.arm.segment_dof();
+  const Eigen::Map<const Eigen::MatrixXd> cross(settings.cross_nm_per_bar.data(), 2 * n,
+                                                map.cols());
+  for (int i = 0; i < n; ++i) map.middleRows<2>(width * i) += cross.middleRows<2>(2 * i);
   return map;
 }
 

@@ -116,7 +116,8 @@ void ValveDriver::give_up() noexcept {
 }
 
 void ValveDriver::keep_error() noexcept {
-  std::strncpy(error_.data(), backend_->error(), error_.size() - 1);
+  *fmt::format_to_n(error_.data(), error_.size() - 1, FMT_STRING("{}"), backend_->error()).out =
+      '\0';
 }
 
 void ValveDriver::stop(std::int64_t now_ns) noexcept {

@@ -1,3 +1,9 @@
+# softarm_compile_together(COUNT TARGETS...): with SOFTARM_PRECOMPILED_HEADERS so many files are compiled as one, as headers are
+# much of the compile time. Within them no file-local name may occur twice.
+function(softarm_compile_together count)
+  set_target_properties(${ARGN} PROPERTIES UNITY_BUILD ${SOFTARM_PRECOMPILED_HEADERS} UNITY_BUILD_BATCH_SIZE ${count})
+endfunction()
+
 # softarm_precompile(KIND TARGETS...): with SOFTARM_PRECOMPILED_HEADERS the heavy headers of other projects are compiled once a
 # KIND (module, program or test) instead of once a file: a third of the time of a first build. Every file includes what it
 # uses all the same: the sanitizers' and the debugging presets build without.

@@ -46,16 +46,14 @@ function(softarm_module name)
     PRIVATE ${MODULE_PRIVATE_DEPENDS} $<BUILD_INTERFACE:softarm_options>)
   set_property(GLOBAL APPEND PROPERTY SOFTARM_MODULES softarm_${name})
   softarm_precompile(module softarm_${name})
-  # Much of a file's compile time is headers, but for the recursions in model, which each use their namespace.
-  if(NOT name STREQUAL "model")
-    set_target_properties(softarm_${name} PROPERTIES UNITY_BUILD ${SOFTARM_PRECOMPILED_HEADERS} UNITY_BUILD_BATCH_SIZE 6)
+  if(NOT name STREQUAL "model")  # whose recursions each use their namespace
+    softarm_compile_together(6 softarm_${name})
   endif()
 endfunction()
 
-# For tests, and programs that parse, call and print: the modules that they call are optimised in full, they are not, and several
-# files are compiled as one.
+# For tests, and programs that parse, call and print: the modules that they call are optimised in full, they are not.
 function(softarm_optimise_less)
-  set_target_properties(${ARGN} PROPERTIES UNITY_BUILD ${SOFTARM_PRECOMPILED_HEADERS} UNITY_BUILD_BATCH_SIZE 8)
+  softarm_compile_together(8 ${ARGN})
   if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
     foreach(target IN LISTS ARGN)
       # At -O1 g++ 12 reports false positives in Eigen and std::string; in tests the sanitizers look for them.

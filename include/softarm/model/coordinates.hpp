@@ -18,6 +18,18 @@ inline ArmParameters at_rest_length(ArmParameters arm) {
   return arm;
 }
 
+/// Of every segment, m; at rest where it stretches.
+inline SegmentScalars lengths(const ArmParameters& arm) noexcept {
+  SegmentScalars out(arm.size());
+  for (Eigen::Index i = 0; i < arm.size(); ++i)
+    out[i] = arm.segments[static_cast<std::size_t>(i)].length_m;
+  return out;
+}
+inline void set_lengths(ArmParameters& arm, ConstVectorRef length_m) noexcept {
+  for (Eigen::Index i = 0; i < arm.size(); ++i)
+    arm.segments[static_cast<std::size_t>(i)].length_m = length_m[i];
+}
+
 /// The first two of every segment, 2n; nothing of nothing.
 inline SegmentVector bend_part(const ArmParameters& arm, ConstVectorRef q) noexcept {
   if (!arm.extensible || q.size() != arm.dof()) return q;

@@ -1,6 +1,6 @@
 // Elements that remember: play operators (Prandtl-Ishlinskii hysteresis), the model of Bouc and Wen,
-// and a Maxwell element. Each is one state a direction, free of allocation and bounded, for simulation, identification and
-// feed-forward alike.
+// and a Maxwell element. Each is one state a direction, free of allocation and bounded, for
+// simulation, identification and feed-forward alike.
 #pragma once
 
 #include <Eigen/Core>

@@ -2,6 +2,7 @@
 // config/template.yaml documents every setting.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <vector>
 
@@ -96,8 +97,12 @@ struct PlantSettings {
   ValveSettings valves;
   MaterialSettings material;
   /// Generalized force of every chamber in turn on all segments, beside its own moment: 2n numbers a
-  /// chamber, N m/bar. Empty: none.
+  /// chamber, N m/bar. Empty or all zero: none.
   std::vector<double> cross_nm_per_bar;
+  bool crosses() const {
+    return std::any_of(cross_nm_per_bar.begin(), cross_nm_per_bar.end(),
+                       [](double force) { return force != 0.0; });
+  }
   MocapSettings mocap;
   /// At rest. Where a segment has several parts, each takes its share, as under a uniform moment.
   SegmentVector initial_u_rad;

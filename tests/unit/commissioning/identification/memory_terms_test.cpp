@@ -1,5 +1,6 @@
 // Arms that lag and remember: responses against closed forms, and terms that are chosen because they
 // are there.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "softarm/commissioning/identification/fit_report.hpp"
@@ -144,19 +145,37 @@ TEST(TermSelection, KeepsWhatIsThereAndLeavesOutWhatIsNot) {
   }
 }
 
-TEST(IdentifiedYaml, HoldsEveryTermAndLoadsAgain) {
-  const TestFolder folder;
-  const auto base = folder.write("base.yaml", R"(
+/// An arm with three chambers a segment, what was identified of it, and the file that says so.
+struct FoundArm {
+  explicit FoundArm(int segments)
+      : base(folder.write("base.yaml", fmt::format(R"(
 name: base
-arm: {segments: 2, length_m: 0.1, mass_kg: 0.1, stiffness_nm_per_rad: 1, damping_nms_per_rad: 0.1}
-actuation: {chambers: {angle_rad: [0, 2*pi/3, 4*pi/3], gain_nm_per_bar: 0.3}, max_pressure_bar: 1}
-control: {kp_nm_per_rad: 0}
-reference: [{kind: set_point, theta_rad: 0}]
-)");
-  const Experiment experiment = load_experiment(base);
-  ArmHypothesis arm = configured(experiment);
+arm: {{segments: {}, length_m: 0.1, mass_kg: 0.1, stiffness_nm_per_rad: 1, damping_nms_per_rad: 0.1}}
+actuation: {{chambers: {{angle_rad: [0, 2*pi/3, 4*pi/3], gain_nm_per_bar: 0.3}}, max_pressure_bar: 1}}
+control: {{kp_nm_per_rad: 0, valve_lag_s: 0.8}}
+reference: [{{kind: set_point, theta_rad: 0}}]
+)",
+                                                   segments))),
+        experiment(load_experiment(base)),
+        arm(configured(experiment)) {}
+
+  Experiment written() const {
+    const auto file = folder.path() / "found.yaml";
+    folder.write("found.yaml", identified_yaml(experiment, arm, choice, "test", base, file));
+    return load_experiment(file);
+  }
+
+  TestFolder folder;
+  std::filesystem::path base;
+  Experiment experiment;
+  ArmHypothesis arm;
   FitChoice choice;
-  choice.directions = true;
+};
+
+TEST(IdentifiedYaml, HoldsEveryTermAndLoadsAgain) {
+  FoundArm found(2);
+  ArmHypothesis& arm = found.arm;
+  found.choice.directions = true;
   arm.inertia = false;
   for (Eigen::Index j = 0; j < 6; ++j)  // all push to one side: no actuation of a controller
     arm.input_map.col(j) << 0.1 + 0.01 * static_cast<double>(j), 0.02 * static_cast<double>(j);
@@ -176,9 +195,7 @@ reference: [{kind: set_point, theta_rad: 0}]
   stretch.friction_m = 1e-3;
   stretch.remanence = {0.1, 40.0};
 
-  const auto file = folder.path() / "found.yaml";
-  folder.write("found.yaml", identified_yaml(experiment, arm, choice, "test", base, file));
-  const ArmHypothesis loaded = configured(load_experiment(file));
+  const ArmHypothesis loaded = configured(found.written());
   EXPECT_EQ(loaded.inertia, arm.inertia);
   EXPECT_LT((loaded.input_map - arm.input_map).norm(), 1e-6);
   ASSERT_EQ(loaded.lags.size(), 6U);
@@ -206,28 +223,15 @@ reference: [{kind: set_point, theta_rad: 0}]
 
 /// What was identified is what the tick inverts; what was not, and what was configured only, is not.
 TEST(IdentifiedYaml, InvertsTheActuatorsThatWereFound) {
-  const TestFolder folder;
-  const auto base = folder.write("base.yaml", R"(
-name: base
-arm: {segments: 1, length_m: 0.1, mass_kg: 0.1, stiffness_nm_per_rad: 1, damping_nms_per_rad: 0.1}
-actuation: {chambers: {angle_rad: [0, 2*pi/3, 4*pi/3], gain_nm_per_bar: 0.3}, max_pressure_bar: 1}
-control: {kp_nm_per_rad: 0, valve_lag_s: 0.8}
-reference: [{kind: set_point, theta_rad: 0}]
-)");
-  const Experiment experiment = load_experiment(base);
-  ArmHypothesis arm = configured(experiment);
+  FoundArm found(1);
+  ArmHypothesis& arm = found.arm;
   arm.lags = {{0.5, 1.4}, {0.6, 1.5}, {0.7, 1.2}};
   arm.slip_springs = {{0.01, 0.3}, {0.05, 0.2}};
   arm.stiffening_1pbar = 0.25;
-  FitChoice choice;
-  const auto found = [&] {
-    const auto file = folder.path() / "found.yaml";
-    folder.write("found.yaml", identified_yaml(experiment, arm, choice, "test", base, file));
-    return load_experiment(file);
-  };
-  EXPECT_FALSE(found().actuator_inverse.any()) << "as configured";
+  FitChoice& choice = found.choice;
+  EXPECT_FALSE(found.written().actuator_inverse.any()) << "as configured";
   choice.chamber_lags = choice.hysteresis = choice.stiffening = true;
-  const Experiment all = found();
+  const Experiment all = found.written();
   const ActuatorInverseSettings& inverse = all.actuator_inverse;
   ASSERT_EQ(inverse.fill_lag_s.size(), 3U);
   for (std::size_t j = 0; j < 3; ++j) {
@@ -240,7 +244,7 @@ reference: [{kind: set_point, theta_rad: 0}]
   EXPECT_NEAR(inverse.stiffening_per_bar, 0.25, 1e-9);
   EXPECT_NEAR(all.control.valve_lag_s, 0.15, 1e-9) << "a tenth of the longest lag";
   arm.stiffening_1pbar = -0.1;  // what no pressure does is not inverted
-  EXPECT_EQ(found().actuator_inverse.stiffening_per_bar, 0.0);
+  EXPECT_EQ(found.written().actuator_inverse.stiffening_per_bar, 0.0);
 }
 
 TEST(TipPrediction, ChordsOfConstantCurvatureGiveTheTip) {
