@@ -45,7 +45,8 @@ class Checks {
     check_radius("arm", experiment_.arm, false);
     check_radius("plant.arm", experiment_.plant.arm,
                  experiment_.plant.kind.get_if<LinkSettings>() != nullptr);
-    check_stretch();
+    if (experiment_.arm.extensible) check_stretching_control();
+    check_plant();
     check_actuation("actuation", experiment_.actuation);
     check_actuation("plant.actuation", experiment_.plant.actuation);
     check_same_chambers();
@@ -161,15 +162,23 @@ class Checks {
     }
   }
 
-  void check_stretch() const {
-    if (experiment_.arm.extensible) check_stretching_control();
+  /// What the simulated arm asks of its kind and of its valves.
+  void check_plant() const {
     const PlantSettings& plant = experiment_.plant;
+    require(plant.valves.supply_sag_s == 0.0 ||
+                (plant.valves.lag_s > 0.0 && plant.actuation.kind == ActuationKind::chambers),
+            "plant.valves.supply_sag_s",
+            "0 s where plant.valves.lag_s is 0 s or actuation is by torque",
+            fmt::format("{} s", plant.valves.supply_sag_s));
+    const auto make = [&] { plant.kind.make(plant); };
+    if (plant.material.bends_otherwise())
+      check_module("plant.material", "a kind of plant that has these terms, such as pcc", make);
     if (!plant.arm.extensible) return;
     require(plant.arm.actuation == ActuationModel::chamber, "plant.arm.extensible",
             "false with actuation_model: couple, which has no axial force",
             "segments that stretch");
     check_module("plant.arm.extensible", "a kind of plant whose segments can stretch, such as pcc",
-                 [&] { plant.kind.make(plant); });
+                 make);
   }
 
   void check_actuation(const std::string& key, const ActuationSettings& it) const {
