@@ -5,7 +5,7 @@ function(softarm_compile_together count)
 endfunction()
 
 # softarm_precompile(KIND TARGETS...): with SOFTARM_PRECOMPILED_HEADERS the heavy headers of other projects are compiled once a
-# KIND (module, program or test) instead of once a file: a third of the time of a first build. Every file includes what it
+# KIND (module, program, test or computing_test) instead of once a file: a third of the time of a first build. Every file includes what it
 # uses all the same: the sanitizers' and the debugging presets build without.
 option(SOFTARM_PRECOMPILED_HEADERS "Compile the headers of Eigen, fmt, CLI11 and GoogleTest once, not once a file" OFF)
 
@@ -14,6 +14,7 @@ set(SOFTARM_MODULE_HEADERS
   <optional> <span> <stdexcept> <string> <vector>)
 set(SOFTARM_PROGRAM_HEADERS ${SOFTARM_MODULE_HEADERS} <CLI/CLI.hpp> <yaml-cpp/yaml.h>)
 set(SOFTARM_TEST_HEADERS ${SOFTARM_MODULE_HEADERS} <gtest/gtest.h> <fstream> <random>)
+set(SOFTARM_COMPUTING_TEST_HEADERS ${SOFTARM_TEST_HEADERS})
 
 function(softarm_precompile kind)
   if(NOT SOFTARM_PRECOMPILED_HEADERS)
@@ -47,11 +48,13 @@ function(softarm_headers_owner kind owner)
   target_link_libraries(${owner} PRIVATE Eigen3::Eigen fmt::fmt)
   if(kind STREQUAL "program")
     target_link_libraries(${owner} PRIVATE CLI11::CLI11 yaml-cpp)
-  elseif(kind STREQUAL "test")
+  elseif(kind MATCHES "test$")
     target_link_libraries(${owner} PRIVATE GTest::gtest)
   endif()
-  if(NOT kind STREQUAL "module")
-    softarm_optimise_less(${owner})
+  if(kind STREQUAL "test")
+    softarm_optimise_less(0 ${owner})
+  elseif(NOT kind STREQUAL "module")
+    softarm_optimise_less(1 ${owner})
   endif()
   string(TOUPPER ${kind} KIND)
   target_precompile_headers(${owner} PRIVATE ${SOFTARM_${KIND}_HEADERS})

@@ -1,8 +1,9 @@
 # softarm_module(NAME DEPENDS libraries PRIVATE_DEPENDS libraries): a module of the tree as a separate library, so that the linker
 # checks the direction of the arrows too. softarm_program(NAME DEPENDS ...): an executable.
-# softarm_tests(LABEL MODULE [REAL_TIME] [SLOW FILTER] DEPENDS ...): one test program from every *_test.cpp below the folder MODULE;
-# REAL_TIME for those that watch programs run in real time: one of a test program at a time, beside other tests; those whose names
-# FILTER matches get the label slow instead, and run alone.
+# softarm_tests(LABEL MODULE [COMPUTES] [REAL_TIME] [SLOW FILTER] DEPENDS ...): one test program from every *_test.cpp below the
+# folder MODULE; COMPUTES for those that calculate much themselves, the others are not optimised at all; REAL_TIME for those that
+# watch programs run in real time: one of a test program at a time, beside other tests; those whose names FILTER matches get the
+# label slow instead, and run alone.
 
 include(SoftarmHeaders)
 
@@ -52,12 +53,12 @@ function(softarm_module name)
 endfunction()
 
 # For tests, and programs that parse, call and print: the modules that they call are optimised in full, they are not.
-function(softarm_optimise_less)
+function(softarm_optimise_less level)
   softarm_compile_together(8 ${ARGN})
   if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
     foreach(target IN LISTS ARGN)
       # At -O1 g++ 12 reports false positives in Eigen and std::string; in tests the sanitizers look for them.
-      target_compile_options(${target} PRIVATE $<$<NOT:$<CONFIG:Debug>>:-O1 -Wno-maybe-uninitialized -Wno-array-bounds -Wno-stringop-overflow>)
+      target_compile_options(${target} PRIVATE $<$<NOT:$<CONFIG:Debug>>:-O${level} -Wno-maybe-uninitialized -Wno-array-bounds -Wno-stringop-overflow>)
     endforeach()
   endif()
 endfunction()
@@ -68,13 +69,13 @@ function(softarm_program name)
   file(GLOB_RECURSE sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/${name}/*.cpp)
   add_executable(${name} ${sources})
   target_link_libraries(${name} PRIVATE softarm_program_frame ${PROGRAM_DEPENDS} softarm_options)
-  softarm_optimise_less(${name})
+  softarm_optimise_less(1 ${name})
   softarm_precompile(program ${name})
   install(TARGETS ${name} RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
 endfunction()
 
 function(softarm_tests label module)
-  cmake_parse_arguments(TESTS "REAL_TIME" "SLOW" "DEPENDS" ${ARGN})
+  cmake_parse_arguments(TESTS "COMPUTES;REAL_TIME" "SLOW" "DEPENDS" ${ARGN})
   file(GLOB_RECURSE sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/${module}/*_test.cpp)
   if(NOT sources)
     return()
@@ -85,8 +86,13 @@ function(softarm_tests label module)
   target_link_libraries(${target} PRIVATE ${TESTS_DEPENDS} GTest::gtest_main softarm_options)
   target_compile_definitions(${target} PRIVATE
     SOFTARM_SOURCE_DIR="${PROJECT_SOURCE_DIR}" SOFTARM_BINARY_DIR="${PROJECT_BINARY_DIR}")
-  softarm_optimise_less(${target})
-  softarm_precompile(test ${target})
+  if(TESTS_COMPUTES)
+    softarm_optimise_less(1 ${target})
+    softarm_precompile(computing_test ${target})
+  else()
+    softarm_optimise_less(0 ${target})
+    softarm_precompile(test ${target})
+  endif()
   set(usual "*")
   set(lock "")
   if(TESTS_REAL_TIME)
