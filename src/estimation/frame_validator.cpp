@@ -21,7 +21,7 @@ constexpr int kRestartRun = 3;
 constexpr std::uint64_t kMaxCountedGap = 1'000'000;
 // A jump must exceed what noise explains: standard deviations of the difference of two
 // measurements.
-constexpr double kSpeedNoiseMargin = 8.0;
+constexpr double kNoiseMargin = 8.0;
 
 /// Of every FrameVerdict, in its order.
 constexpr std::int64_t FrameCounters::*kCounters[] = {
@@ -168,7 +168,7 @@ FrameVerdict FrameValidator::judge_segments(const MocapFrame& frame) noexcept {
     const double noise = std::sqrt(candidate_.variance_rad2[i] + seen_variance_rad2_[i]);
     const Eigen::Vector2d u = candidate_.u_rad.segment<2>(2 * static_cast<Eigen::Index>(i));
     jumped = jumped || !((u - seen_u_rad_[i]).norm() <=
-                         settings_.max_speed_radps * passed_s + kSpeedNoiseMargin * noise);
+                         settings_.max_speed_radps * passed_s + kNoiseMargin * noise);
   }
   if (!any) return FrameVerdict::not_seen;
   return jumped ? FrameVerdict::jump : FrameVerdict::accepted;
