@@ -67,8 +67,8 @@ void add_strain(const L& strain_x, ExtensibleLanesOf<L>& k) noexcept {
   k.own_stretch += strain_x * (m.pp1 * (k.ux * k.ux + k.uy * k.uy) + m.qq1);
 }
 
-/// What segments of known shape do within their own frames. `number(v, k)` is the k-th of their own
-/// coordinates in v, an input of the whole arm.
+/// What segments of known shape do within their frames. `number(v, k)` is their coordinate k in v, an
+/// input of the whole arm.
 template <MassModel kMass, bool kInertia, bool kCoriolis, class Segments, class Number>
 SOFTARM_INLINE void set_own_motion(const Inputs& in, const Number& number, Segments& k) noexcept {
   using L = typename Segments::Lane;
