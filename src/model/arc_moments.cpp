@@ -135,29 +135,21 @@ ArcMomentsOf<Lanes> arc_moments(const Lanes& mass_length_squared, const Lanes& s
   return all;
 }
 
-template <class S, class D>
-ArcMomentsOf<Dual<Lanes, D>> arc_moments(const S& mass_length_squared, const Dual<Lanes, D>& s,
-                                         const std::array<Dual<Lanes, D>, 12>& c) noexcept {
-  ArcMomentsOf<Dual<Lanes, D>> all = from_entire(mass_length_squared, c);
+ArcMomentsOf<SlopeLanes> arc_moments(const Lanes& mass_length_squared, const SlopeLanes& s,
+                                     const std::array<SlopeLanes, 12>& c) noexcept {
+  ArcMomentsOf<SlopeLanes> all = from_entire(mass_length_squared, c);
   for (int lane = 0; lane < kLanes; ++lane) {
     if (s.v[lane] < kArcSeriesLimit) continue;
-    auto one = from_trigonometry(at(mass_length_squared, lane), at(s, lane), at(c[0], lane),
-                                 at(c[1], lane));
+    auto one =
+        from_trigonometry(mass_length_squared[lane], at(s, lane), at(c[0], lane), at(c[1], lane));
     const auto to = members(all);
     const auto from = members(one);
     for (std::size_t k = 0; k < to.size(); ++k) {
       to[k]->v[lane] = from[k]->v;
-      for (std::size_t e = 0; e < to[k]->d.along.size(); ++e) {
-        to[k]->d.along[e][lane] = from[k]->d[static_cast<int>(e)];
-      }
+      to[k]->d[lane] = from[k]->d;
     }
   }
   return all;
 }
-
-template ArcMomentsOf<BendingLanes> arc_moments(const Lanes&, const BendingLanes&,
-                                                const std::array<BendingLanes, 12>&) noexcept;
-template ArcMomentsOf<StretchLanes> arc_moments(const StretchLanes&, const StretchLanes&,
-                                                const std::array<StretchLanes, 12>&) noexcept;
 
 }  // namespace softarm

@@ -38,9 +38,8 @@ ArcMoments arc_moments(double mass_length_squared, double s,
 ArcMomentsOf<Lanes> arc_moments(const Lanes& mass_length_squared, const Lanes& s,
                                 const std::array<Lanes, 12>& c) noexcept;
 
-/// With tangents: defined for Lanes with two or three of them, and S Lanes of either kind.
-template <class S, class D>
-ArcMomentsOf<Dual<Lanes, D>> arc_moments(const S& mass_length_squared, const Dual<Lanes, D>& s,
-                                         const std::array<Dual<Lanes, D>, 12>& c) noexcept;
+/// With their derivatives by what s depends on.
+ArcMomentsOf<SlopeLanes> arc_moments(const Lanes& mass_length_squared, const SlopeLanes& s,
+                                     const std::array<SlopeLanes, 12>& c) noexcept;
 
 }  // namespace softarm

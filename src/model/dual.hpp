@@ -80,7 +80,19 @@ Dual<double, D> sqrt(const Dual<double, D>& a) noexcept {
   return {root, (0.5 / root) * a.d};
 }
 
-/// Tangents of four segments, each along its own N coordinates.
+/// What carries no tangents beside numbers of type L.
+template <class L>
+struct PlainNumber {
+  using type = L;
+};
+template <class T, class D>
+struct PlainNumber<Dual<T, D>> {
+  using type = T;
+};
+template <class L>
+using PlainOf = typename PlainNumber<L>::type;
+
+/// N tangents of four numbers.
 template <int N>
 struct LaneTangents {
   std::array<Lanes, N> along{};
@@ -112,14 +124,16 @@ using BendingDual = Dual<double, Pair>;
 using StretchDual = Dual<double, Quad>;
 using BendingLanes = Dual<Lanes, LaneTangents<2>>;
 using StretchLanes = Dual<Lanes, LaneTangents<3>>;
+/// Four numbers with their derivatives by one variable.
+using SlopeLanes = Dual<Lanes, Lanes>;
 
-/// The number of one segment of four.
+/// The number of one segment of four, or of the only one.
 inline double at(const Lanes& v, int l) noexcept { return v[l]; }
-inline BendingDual at(const BendingLanes& a, int l) noexcept {
-  return {a.v[l], Pair{a.d.along[0][l], a.d.along[1][l]}};
-}
-inline StretchDual at(const StretchLanes& a, int l) noexcept {
-  return {a.v[l], Quad{a.d.along[0][l], a.d.along[1][l], a.d.along[2][l], 0.0}};
+inline Dual<double, double> at(const SlopeLanes& a, int l) noexcept { return {a.v[l], a.d[l]}; }
+inline double at(double v, int) noexcept { return v; }
+template <class D>
+Dual<double, D> at(const Dual<double, D>& a, int) noexcept {
+  return a;
 }
 
 /// c_0 ... c_{N-1} by dc_k/ds = (k c_{k+2} - c_{k+1}) / 2. With N = 12 the tangents of the last two

@@ -135,17 +135,6 @@ bool solve(const Eigen::Ref<const Eigen::MatrixXd>& B, ConstVectorRef rhs,
   return true;
 }
 
-/// Sizes that the compiler knows take half of the time.
-constexpr int kTwoSegments = 4, kThreeSegments = 6, kThreeThatStretch = 9;
-template <class Function>
-Function* of_size(Eigen::Index n, Function* two, Function* three, Function* stretch,
-                  Function* any) noexcept {
-  return n == kThreeSegments      ? three
-         : n == kTwoSegments      ? two
-         : n == kThreeThatStretch ? stretch
-                                  : any;
-}
-
 }  // namespace
 
 void hold_constant_lengths(const ArmParameters& arm, Eigen::Ref<Eigen::MatrixXd> B,
@@ -163,8 +152,7 @@ void hold_constant_lengths(const ArmParameters& arm, Eigen::Ref<Eigen::MatrixXd>
 bool solve_inertia(DynamicsWorkspace& workspace, const Eigen::Ref<const Eigen::MatrixXd>& B,
                    ConstVectorRef rhs, VectorRef x) noexcept {
   auto& s = workspace.storage();
-  const auto run = of_size(B.rows(), solve<kTwoSegments>, solve<kThreeSegments>,
-                           solve<kThreeThatStretch>, solve<0>);
+  const auto run = of_size(B.rows(), [](auto size) { return solve<size()>; });
   if (!run(B, rhs, s)) {
     x.setConstant(std::numeric_limits<double>::quiet_NaN());
     return false;
@@ -176,8 +164,7 @@ bool solve_inertia(DynamicsWorkspace& workspace, const Eigen::Ref<const Eigen::M
 void inverse_of_last_inertia(DynamicsWorkspace& workspace,
                              Eigen::Ref<Eigen::MatrixXd> out) noexcept {
   auto& s = workspace.storage();
-  const auto run = of_size(out.rows(), invert<kTwoSegments>, invert<kThreeSegments>,
-                           invert<kThreeThatStretch>, invert<0>);
+  const auto run = of_size(out.rows(), [](auto size) { return invert<size()>; });
   run(out.rows(), s.factor.data(), s.inverse_pivots.data(), s.B.data(), out.data(),
       out.outerStride());
 }
@@ -186,10 +173,9 @@ bool forward_dynamics(const ArmParameters& arm, DynamicsWorkspace& workspace, Co
                       ConstVectorRef velocity, ConstVectorRef generalized_force,
                       VectorRef acceleration) noexcept {
   auto& s = workspace.storage();
-  if (arm.is_thick()) inertia_matrix(arm, workspace, u, s.B);
   inverse_dynamics(arm, workspace, u, velocity, velocity, s.zeros,
                    {.inertia = false, .coriolis = true, .gravity = true}, s.bias);
-  if (!arm.is_thick()) inertia_of_last_shape(arm, workspace, s.B);
+  inertia_of_last_shape(arm, workspace, s.B);
   add_impedance(arm, u, velocity, s.bias);
   s.bias = generalized_force - s.bias;
   if (arm.extensible) hold_constant_lengths(arm, s.B, s.bias);

@@ -14,43 +14,11 @@
 #include <cmath>
 #include <limits>
 
-#include "model/dynamics_storage.hpp"
+#include "model/column_momenta.hpp"
 #include "softarm/model/dynamics.hpp"
-#include "softarm/model/polar.hpp"
 
 namespace softarm {
 namespace {
-
-/// Momenta of a segment's columns, handed from ancestor to ancestor.
-template <class Column>
-struct ColumnMomenta {
-  Vec3<Column> P, L, P_rate, L_rate, flow;
-
-  template <bool kCoriolis>
-  void rotate_by(const Turn& turn) noexcept {
-    P = rotate(turn, P);
-    L = rotate(turn, L);
-    if constexpr (!kCoriolis) return;
-    P_rate = rotate(turn, P_rate);
-    L_rate = rotate(turn, L_rate);
-    flow = rotate(turn, flow);
-  }
-  template <bool kCoriolis>
-  void move_by(const Vector3& t, const Vector3& t_rate) noexcept {
-    L += cross(t, P);
-    if constexpr (!kCoriolis) return;
-    L_rate += cross(t, P_rate);
-    flow += cross(t_rate, P);
-  }
-};
-
-struct Output {
-  double* data;
-  Eigen::Index stride;
-
-  double& operator()(int row, int col) const noexcept { return data[row + col * stride]; }
-  Output from(int row, int col) const noexcept { return {data + row + col * stride, stride}; }
-};
 
 /// [u_x, u_y], [phi, theta] or [u_x, u_y, e] a segment.
 enum class Coordinates { u, polar, ue };
@@ -150,11 +118,13 @@ void load_polar(const ArmParameters& arm, int begin, const double* q, const doub
   load_u<kArc>(arm, begin, u, u_rate, out);
 }
 
-/// Columns of the segment in this lane; without kRates only what B needs.
+/// Columns of segment i; without kRates only what B needs.
 template <bool kArc, bool kRates, bool kExtensible>
-[[gnu::always_inline]] inline void set_columns(const ShapeLanes& lanes, int l,
+[[gnu::always_inline]] inline void set_columns(const ArmParameters& arm, int i,
+                                               const ShapeLanes& lanes,
                                                const SegmentState<kExtensible>& own,
                                                SegmentColumns<kExtensible>& k) noexcept {
+  const int l = lane_of(i);
   const Curve centre = lane(lanes.centre, l);
   const Spin rotation = lane(lanes.turn_rate, l);
   k.turn = turn(lanes, l);
@@ -172,6 +142,8 @@ template <bool kArc, bool kRates, bool kExtensible>
   }
   if constexpr (kArc) {
     k.own = arc_columns<kRates>(k.mass, own, centre, lane(lanes.arc, l));
+    const double radius = arm.segments[static_cast<std::size_t>(i)].radius_m;
+    if (radius > 0.0) add_discs<kRates>(0.25 * k.mass * radius * radius, own, k.own);
   } else {
     k.own = point_columns<kRates>(k.mass, own, centre);
   }
@@ -201,28 +173,12 @@ void outward(const ArmParameters& arm, const State& state,
     SegmentState<kExtensible> own{ux, uy, v, spin_of_frame, {}};
     if constexpr (kExtensible) own.stretch = {states.strain_rate[l], states.inverse_length[l]};
     SegmentColumns<kExtensible>& k = out[i];
-    set_columns<kArc, true>(lanes, l, own, k);
+    set_columns<kArc, true>(arm, i, lanes, own, k);
     k.gravity = gravity;
     if constexpr (kPolar) states.polar[static_cast<std::size_t>(l)].apply(k);
     spin_of_frame = rotate_back(k.turn, spin_of_frame + first(lane(lanes.turn_rate, l), ux, uy, v));
     gravity = rotate_back(k.turn, gravity);
   }
-}
-
-/// Columns of j over everything beyond p_j, about p_j.
-template <bool kCoriolis, bool kExtensible>
-auto beyond(const SegmentColumns<kExtensible>& k, const Composite& body) noexcept {
-  const Vector3 h = column(body.first, 0), h_rate = column(body.first, 1);
-  const SecondMoments position(body.second, 0), mixed(body.second, 1);
-  ColumnMomenta<Columns<kExtensible>> m;
-  m.P = body.mass * k.translation - cross(h, k.rotation);
-  m.L = cross(h, k.translation) + position.off_trace(k.rotation);
-  if constexpr (!kCoriolis) return m;
-  m.P_rate = body.mass * k.translation_rate - cross(h, k.rotation_rate) - cross(h_rate, k.rotation);
-  m.L_rate = cross(h, k.translation_rate) + position.off_trace(k.rotation_rate) +
-             mixed.off_trace_transposed(k.rotation);
-  m.flow = cross(h_rate, k.translation) + mixed.off_trace(k.rotation);
-  return m;
 }
 
 template <bool kCoriolis, bool kExtensible>
@@ -270,29 +226,23 @@ template <bool kCoriolis, bool kExtensible>
 void inward(int n, const SegmentColumns<kExtensible>* segments, const Output& B, const Output& C,
             double* G) noexcept {
   constexpr int kWidth = kCoordinates<kExtensible>;
+  constexpr Momenta kWhich = kCoriolis ? Momenta::rates : Momenta::inertia;
   Composite body;
   for (int j = n - 1; j >= 0; --j) {
     const SegmentColumns<kExtensible>& k = segments[j];
     body.rotate_by(k.turn);
-    auto m = beyond<kCoriolis>(k, body);
+    auto m = beyond<kWhich>(k, body);
     write_diagonal<kCoriolis>(j, k, m, B, C);
-    m.template move_by<kCoriolis>(k.tip, k.tip_rate);
-    m.P += k.own.momentum;
-    m.L += k.own.angular;
-    if constexpr (kCoriolis) {
-      m.P_rate += k.own.momentum_rate;
-      m.L_rate += k.own.angular_rate;
-      m.flow += k.own.flow;
-    }
+    m.template move_past<kWhich>(k);
     if constexpr (kCoriolis) {
       const auto weight = dot(k.gravity, m.P);
       for (int a = 0; a < kWidth; ++a) G[kWidth * j + a] = -weight[a];
     }
     for (int i = j - 1; i >= 0; --i) {
       const SegmentColumns<kExtensible>& ancestor = segments[i];
-      m.template rotate_by<kCoriolis>(ancestor.turn);
+      m.template rotate_by<kWhich>(ancestor.turn);
       write_pair<kCoriolis>(i, j, ancestor, m, B, C);
-      m.template move_by<kCoriolis>(ancestor.tip, ancestor.tip_rate);
+      m.template move_by<kWhich>(ancestor.tip, ancestor.tip_rate);
     }
     body.move_by(k.tip, side_by_side(k.tip, k.tip_rate));
     body.add(k.mass, k.own.first, k.own.second);
@@ -300,13 +250,19 @@ void inward(int n, const SegmentColumns<kExtensible>* segments, const Output& B,
 }
 
 template <Coordinates kCoords>
-void evaluate(const ArmParameters& arm, DynamicsWorkspace& workspace, const State& state,
-              const Output& B, const Output& C, double* G) noexcept {
-  auto* segments = workspace.storage().of<kCoords == Coordinates::ue>().columns.data();
+auto* set_all_columns(const ArmParameters& arm, DynamicsWorkspace& workspace,
+                      const State& state) noexcept {
+  auto* const segments = workspace.storage().of<kCoords == Coordinates::ue>().columns.data();
   const auto run = arm.mass == MassModel::point ? outward<MassModel::point, kCoords>
                                                 : outward<MassModel::distributed, kCoords>;
   run(arm, state, segments, from_eigen(arm.base_rotation.transpose() * arm.gravity_mps2));
-  inward<true>(arm.size(), segments, B, C, G);
+  return segments;
+}
+
+template <Coordinates kCoords>
+void evaluate(const ArmParameters& arm, DynamicsWorkspace& workspace, const State& state,
+              const Output& B, const Output& C, double* G) noexcept {
+  inward<true>(arm.size(), set_all_columns<kCoords>(arm, workspace, state), B, C, G);
 }
 
 /// B alone, of the shape in the workspace.
@@ -318,7 +274,7 @@ void evaluate_inertia(const ArmParameters& arm, SegmentStorage<kExtensible>& s,
     const int l = lane_of(i);
     SegmentState<kExtensible> own{lanes.ux[l], lanes.uy[l], {}, {}, {}};
     if constexpr (kExtensible) own.stretch = {0.0, lanes.inverse_length[l]};
-    set_columns<kArc, false>(lanes, l, own, s.columns[static_cast<std::size_t>(i)]);
+    set_columns<kArc, false>(arm, i, lanes, own, s.columns[static_cast<std::size_t>(i)]);
   }
   inward<false>(arm.size(), s.columns.data(), B, B, nullptr);
 }
@@ -348,28 +304,6 @@ void inertia(const ArmParameters& arm, DynamicsWorkspace::Storage& s, const doub
   inertia(arm, s.inextensible, u, out);
 }
 
-/// A thick arm's columns come from the recursion, which knows rotary inertia: B e_j and C(u, u')
-/// e_j.
-void columns_of_recursion(const ArmParameters& arm, DynamicsWorkspace& workspace, ConstVectorRef u,
-                          ConstVectorRef velocity, Eigen::Ref<Eigen::MatrixXd> B,
-                          Eigen::Ref<Eigen::MatrixXd>* C) noexcept {
-  auto& s = workspace.storage();
-  s.rhs.setZero();
-  for (Eigen::Index j = 0; j < u.size(); ++j) {
-    s.rhs(j) = 1.0;
-    inverse_dynamics(arm, workspace, u, s.zeros, s.zeros, s.rhs,
-                     {.inertia = true, .coriolis = false, .gravity = false}, s.solution);
-    // One triangle decides both: B is symmetric to the last bit.
-    for (Eigen::Index i = 0; i <= j; ++i) B(i, j) = B(j, i) = s.solution(i);
-    if (C != nullptr) {
-      inverse_dynamics(arm, workspace, u, velocity, s.rhs, s.zeros,
-                       {.inertia = false, .coriolis = true, .gravity = false}, s.solution);
-      C->col(j) = s.solution.head(u.size());
-    }
-    s.rhs(j) = 0.0;
-  }
-}
-
 /// Segments that stretch have no polar form.
 void fill_with_nan(Eigen::Ref<Eigen::MatrixXd>& B, Eigen::Ref<Eigen::MatrixXd>& C,
                    VectorRef& G) noexcept {
@@ -381,13 +315,21 @@ void fill_with_nan(Eigen::Ref<Eigen::MatrixXd>& B, Eigen::Ref<Eigen::MatrixXd>& 
 
 }  // namespace
 
+void set_columns_of(const ArmParameters& arm, DynamicsWorkspace& workspace, const double* u,
+                    const double* velocity) noexcept {
+  if (arm.extensible) {
+    set_all_columns<Coordinates::ue>(arm, workspace, {u, velocity});
+  } else {
+    set_all_columns<Coordinates::u>(arm, workspace, {u, velocity});
+  }
+}
+
 void dynamics_matrices(const ArmParameters& arm, DynamicsWorkspace& workspace, ConstVectorRef u,
                        ConstVectorRef velocity, Eigen::Ref<Eigen::MatrixXd> B,
                        Eigen::Ref<Eigen::MatrixXd> C, VectorRef G) noexcept {
   const auto run = arm.extensible ? evaluate<Coordinates::ue> : evaluate<Coordinates::u>;
   run(arm, workspace, {u.data(), velocity.data()}, {B.data(), B.outerStride()},
       {C.data(), C.outerStride()}, G.data());
-  if (arm.is_thick()) columns_of_recursion(arm, workspace, u, velocity, B, &C);
 }
 
 void polar_dynamics_matrices(const ArmParameters& arm, DynamicsWorkspace& workspace,
@@ -395,22 +337,13 @@ void polar_dynamics_matrices(const ArmParameters& arm, DynamicsWorkspace& worksp
                              Eigen::Ref<Eigen::MatrixXd> B, Eigen::Ref<Eigen::MatrixXd> C,
                              VectorRef G) noexcept {
   if (arm.extensible) return fill_with_nan(B, C, G);
-  if (arm.is_thick()) {
-    auto& s = workspace.storage();
-    polar_to_u(q, s.residual);
-    polar_velocity_to_u(q, velocity, s.bias);
-    dynamics_matrices(arm, workspace, s.residual, s.bias, B, C, G);
-    return dynamics_to_polar(q, velocity, B, C, G);
-  }
   evaluate<Coordinates::polar>(arm, workspace, {q.data(), velocity.data()},
                                {B.data(), B.outerStride()}, {C.data(), C.outerStride()}, G.data());
 }
 
 void inertia_matrix(const ArmParameters& arm, DynamicsWorkspace& workspace, ConstVectorRef u,
                     Eigen::Ref<Eigen::MatrixXd> B) noexcept {
-  auto& s = workspace.storage();
-  if (arm.is_thick()) return columns_of_recursion(arm, workspace, u, s.zeros, B, nullptr);
-  inertia(arm, s, u.data(), B);
+  inertia(arm, workspace.storage(), u.data(), B);
 }
 
 void inertia_of_last_shape(const ArmParameters& arm, DynamicsWorkspace& workspace,

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <type_traits>
 #include <vector>
 
 #include "model/own_columns.hpp"
@@ -70,8 +71,27 @@ struct DynamicsWorkspace::Storage {
   Eigen::MatrixXd B, factor;
 };
 
-/// B of the shape that the last `inverse_dynamics` with Coriolis terms on this workspace left; not
-/// of a thick arm.
+/// f(size) with the number of rows as a constant, or 0: sizes that the compiler knows (arms of up to
+/// three segments) take half of the time.
+template <class Function>
+inline auto of_size(Eigen::Index rows, const Function& f) noexcept {
+  switch (rows) {
+    case 2:
+      return f(std::integral_constant<int, 2>{});
+    case 3:
+      return f(std::integral_constant<int, 3>{});
+    case 4:
+      return f(std::integral_constant<int, 4>{});
+    case 6:
+      return f(std::integral_constant<int, 6>{});
+    case 9:
+      return f(std::integral_constant<int, 9>{});
+    default:
+      return f(std::integral_constant<int, 0>{});
+  }
+}
+
+/// B of the shape that the last `inverse_dynamics` with Coriolis terms on this workspace left.
 void inertia_of_last_shape(const ArmParameters& arm, DynamicsWorkspace& workspace,
                            Eigen::Ref<Eigen::MatrixXd> B) noexcept;
 

@@ -1,5 +1,7 @@
 #include "model/own_columns.hpp"
 
+#include "model/rotary_inertia.hpp"
+
 namespace softarm {
 namespace {
 
@@ -110,6 +112,22 @@ template <bool kRates>
   return out;
 }
 
+/// Of four discs side by side, summed: both columns along u, and where segments stretch none along e.
+template <bool kExtensible>
+Columns<kExtensible> sums(const Lanes& x, const Lanes& y) noexcept {
+  const Pair both{detail::sum(x), detail::sum(y)};
+  if constexpr (kExtensible) {
+    return beside(both, 0.0);
+  } else {
+    return both;
+  }
+}
+template <bool kExtensible>
+Vec3<Columns<kExtensible>> sums(const std::array<Vec3<Lanes>, 2>& v) noexcept {
+  return {sums<kExtensible>(v[0].x, v[1].x), sums<kExtensible>(v[0].y, v[1].y),
+          sums<kExtensible>(v[0].z, v[1].z)};
+}
+
 /// {y, y'} where y grows at `strain_rate` as well.
 PairVector3 grown(const PairVector3& y, double strain_rate) noexcept {
   return y + Pair{0.0, strain_rate} * column(y, 0);
@@ -172,9 +190,66 @@ OwnColumns<kExtensible> arc_columns(double mass, const SegmentState<kExtensible>
   }
 }
 
-#define SOFTARM_ARC_COLUMNS(rates, extensible)                                                \
-  template OwnColumns<extensible> arc_columns<rates>(double, const SegmentState<extensible>&, \
-                                                     const Curve&, const ArcMoments&) noexcept
+// A disc's points are rho with int rho rho' = M = j (1 - e e'), j = dm r^2 / 4 and e the tangent, so
+// that int rho x (W x rho) = (tr M - M) W = j (1 + e e') W; with rho' = w x rho, int rho_i rho' = w x
+// M_i, which has no trace.
+template <bool kRates, bool kExtensible>
+void add_discs(double inertia, const SegmentState<kExtensible>& state,
+               OwnColumns<kExtensible>& own) noexcept {
+  using ColumnPair = std::array<Vec3<Lanes>, 2>;
+  const Lanes none{};
+  const auto spread = [](const Vector3& v) {
+    return Vec3<Lanes>{Lanes{} + v.x, Lanes{} + v.y, Lanes{} + v.z};
+  };
+  const Vec3<Lanes> spin_of_frame = spread(state.spin);
+  for (std::size_t node = 0; node < detail::kArcNodes.size(); ++node) {
+    const Lanes x = detail::kArcNodes[node], j = inertia * detail::kArcWeights[node];
+    // Bent by x u; .d are rates within S_{i-1}.
+    const SlopeLanes ux{x * state.ux, x * state.v.x}, uy{x * state.uy, x * state.v.y};
+    const auto c = entire<8>(ux * ux + uy * uy);
+    const Vec3<Lanes> e{c[1].v * ux.v, c[1].v * uy.v, c[0].v};
+    const auto times_M = [&](const Vec3<Lanes>& v) { return j * (v - dot(e, v) * e); };
+    const auto off_trace_M = [&](const Vec3<Lanes>& v) { return j * (v + dot(e, v) * e); };
+    ColumnPair W, W_rate, angular, angular_rate, flow;
+    for (std::size_t f = 0; f < 2; ++f) {
+      const auto along = direction(ux, uy, f == 0 ? x : none, f == 0 ? none : x);
+      const Vec3<SlopeLanes> both = first(spin(c), ux, uy, along);
+      W[f] = {both.x.v, both.y.v, both.z.v};
+      W_rate[f] = Vec3<Lanes>{both.x.d, both.y.d, both.z.d} + cross(spin_of_frame, W[f]);
+      angular[f] = off_trace_M(W[f]);
+    }
+    const Vec3<Lanes> w = spin_of_frame + state.v.x * W[0] + state.v.y * W[1];
+    for (std::size_t f = 0; f < 2; ++f) {
+      angular_rate[f] = off_trace_M(W_rate[f]) - cross(w, times_M(W[f]));
+      flow[f] = times_M(cross(w, W[f]));
+    }
+    own.angular += sums<kExtensible>(angular);
+    for (std::size_t f = 0; f < 2; ++f) {
+      own.inertia[f] += sums<kExtensible>(dot(W[f], angular[0]), dot(W[f], angular[1]));
+    }
+    const auto second_row = [&](const Lanes& e_i, const Vector3& unit) {
+      const Vec3<Lanes> M = j * (spread(unit) - e_i * e), rate = cross(w, M);
+      return PairVector3{Pair{detail::sum(M.x), detail::sum(rate.x)},
+                         Pair{detail::sum(M.y), detail::sum(rate.y)},
+                         Pair{detail::sum(M.z), detail::sum(rate.z)}};
+    };
+    own.second.x += second_row(e.x, {1.0, 0.0, 0.0});
+    own.second.y += second_row(e.y, {0.0, 1.0, 0.0});
+    own.second.z += second_row(e.z, {0.0, 0.0, 1.0});
+    if constexpr (!kRates) continue;
+    own.angular_rate += sums<kExtensible>(angular_rate);
+    own.flow += sums<kExtensible>(flow);
+    for (std::size_t f = 0; f < 2; ++f) {
+      own.coriolis[f] += sums<kExtensible>(dot(W[f], angular_rate[0]), dot(W[f], angular_rate[1]));
+    }
+  }
+}
+
+#define SOFTARM_ARC_COLUMNS(rates, extensible)                                                  \
+  template OwnColumns<extensible> arc_columns<rates>(double, const SegmentState<extensible>&,   \
+                                                     const Curve&, const ArcMoments&) noexcept; \
+  template void add_discs<rates>(double, const SegmentState<extensible>&,                       \
+                                 OwnColumns<extensible>&) noexcept
 SOFTARM_ARC_COLUMNS(false, false);
 SOFTARM_ARC_COLUMNS(false, true);
 SOFTARM_ARC_COLUMNS(true, false);

@@ -59,4 +59,10 @@ template <bool kRates, bool kExtensible>
 OwnColumns<kExtensible> arc_columns(double mass, const SegmentState<kExtensible>& state,
                                     const Curve& centre, const ArcMoments& m) noexcept;
 
+/// Adds what thin discs along the arc do that turn with it (rotary_inertia.hpp).
+/// @param inertia mu r^2 / 4 of the whole segment, kg m^2.
+template <bool kRates, bool kExtensible>
+void add_discs(double inertia, const SegmentState<kExtensible>& state,
+               OwnColumns<kExtensible>& own) noexcept;
+
 }  // namespace softarm

@@ -21,7 +21,7 @@ template <class S, class T>
 struct DiscMotion {
   Vec3<S> spin_a, spin_b, angular;
   T ux, uy;
-  DirectionOf<T> a, b, x;
+  DirectionOf<T, double> a, b, x;
 };
 
 template <class S>
@@ -82,10 +82,8 @@ auto disc_forces(double inertia, const DiscMotion<S, T>& m) noexcept {
   using R = decltype(spread(m.angular.x) * (Lanes{} * spread(m.ux)));
   const auto spin_a = spread(m.spin_a), spin_b = spread(m.spin_b);
   const auto frame_angular = spread(m.angular);
-  const auto spread_direction = [](const Lanes& x, const DirectionOf<T>& d, const auto& ux,
-                                   const auto& uy) {
-    return direction(ux, uy, x * spread(d.x), x * spread(d.y));
-  };
+  const auto spread_direction = [](const Lanes& x, const DirectionOf<T, double>& d, const auto& ux,
+                                   const auto& uy) { return direction(ux, uy, x * d.x, x * d.y); };
   Vec3<R> moment{};
   R torque_x{}, torque_y{};
   for (std::size_t node = 0; node < detail::kArcNodes.size(); ++node) {

@@ -1,6 +1,6 @@
 // What one segment does in its own frame S_{i-1} with that frame's motion given: the steps of the
 // Newton-Euler recursion (inverse_dynamics.cpp). Numbers are doubles, or duals of the segment's own
-// coordinates or of those of a segment before it (dynamics_slopes.cpp).
+// coordinates (derivatives.cpp).
 #pragma once
 
 #include <type_traits>
@@ -23,19 +23,21 @@ struct Inputs {
 };
 
 /// Derivative along x, and twice along a and b.
-template <bool kFirst, bool kSecond, class Coefficients, class Segments, class L>
-Vec3<L> own(const Coefficients& f, const Segments& k, const DirectionOf<L>& x) noexcept {
+template <bool kFirst, bool kSecond, class Coefficients, class Segments, class X>
+auto own(const Coefficients& f, const Segments& k, const X& x) noexcept {
   if constexpr (kFirst && kSecond) {
     return second(f, k.ux, k.uy, k.a, k.b) + first(f, k.ux, k.uy, x);
+  } else if constexpr (kSecond) {
+    return second(f, k.ux, k.uy, k.a, k.b);
+  } else {
+    return first(f, k.ux, k.uy, x);
   }
-  if constexpr (kSecond) return second(f, k.ux, k.uy, k.a, k.b);
-  return first(f, k.ux, k.uy, x);
 }
 
 /// The arc's acceleration within its frame is P x + P1 g + P2 kappa u in the plane and Q1 beta + Q2
 /// kappa along z.
-template <class L>
-SOFTARM_INLINE void own_arc(const DirectionOf<L>& x, SegmentLanesOf<L>& k) noexcept {
+template <class L, class X>
+SOFTARM_INLINE void own_arc(const X& x, SegmentLanesOf<L>& k) noexcept {
   const auto& m = k.arc;
   const L ux = k.ux, uy = k.uy, s = ux * ux + uy * uy;
   const L beta = k.a.x * k.b.x + k.a.y * k.b.y + x.along;
@@ -65,32 +67,33 @@ void add_strain(const L& strain_x, ExtensibleLanesOf<L>& k) noexcept {
   k.own_stretch += strain_x * (m.pp1 * (k.ux * k.ux + k.uy * k.uy) + m.qq1);
 }
 
-/// What segments `begin` ... `begin + 3` do within their own frames; lanes beyond the last segment
-/// are straight and weigh nothing.
-template <MassModel kMass, bool kInertia, bool kCoriolis, class Segments>
-void prepare(const ArmParameters& arm, const Inputs& in, int begin, Segments& k) noexcept {
+/// What segments of known shape do within their frames. `number(v, k)` is their coordinate k in v, an
+/// input of the whole arm.
+template <MassModel kMass, bool kInertia, bool kCoriolis, class Segments, class Number>
+SOFTARM_INLINE void set_own_motion(const Inputs& in, const Number& number, Segments& k) noexcept {
   using L = typename Segments::Lane;
   constexpr bool kExtensible = Segments::kExtensible;
   constexpr bool kArc = kMass == MassModel::distributed && (kInertia || kCoriolis);
   constexpr bool kFirst = kInertia || (kExtensible && kCoriolis);
-  constexpr int kWidth = kCoordinates<kExtensible>;
-  const int count = arm.size() - begin;
-  const int first_of = kWidth * begin;
-  load_shape<kArc>(arm, begin, in.u, k);
-  DirectionOf<L> x{};
-  if constexpr (kInertia) x = load_direction<kExtensible>(in.x + first_of, count, k);
+  const auto along = [&](const double* v) {
+    return direction(k.ux, k.uy, number(v, 0), number(v, 1));
+  };
+  DirectionOf<L, PlainOf<L>> x{};
+  if constexpr (kInertia) x = along(in.x);
   if constexpr (kCoriolis) {
-    k.a = load_direction<kExtensible>(in.a + first_of, count, k);
-    k.b = load_direction<kExtensible>(in.b + first_of, count, k);
+    k.a = along(in.a);
+    k.b = along(in.b);
     k.spin_a = first(k.turn_rate, k.ux, k.uy, k.a);
     k.spin_b = first(k.turn_rate, k.ux, k.uy, k.b);
   } else if constexpr (kArc) {
-    k.a = k.b = DirectionOf<L>{};
+    k.a = k.b = DirectionOf<L, PlainOf<L>>{};
   }
-  DirectionOf<L> grown = x;  // x + e_b a + e_a b: of what has a length
+  // x + e_b a + e_a b: of what has a length
+  std::conditional_t<kExtensible, DirectionOf<L>, DirectionOf<L, PlainOf<L>>> grown{x.x, x.y,
+                                                                                    x.along};
   if constexpr (kExtensible && kCoriolis) {
-    k.strain_a = load_strain_rate(in.a + first_of, count, k.inverse_length);
-    k.strain_b = load_strain_rate(in.b + first_of, count, k.inverse_length);
+    k.strain_a = number(in.a, 2) * k.inverse_length;
+    k.strain_b = number(in.b, 2) * k.inverse_length;
     grown.x += k.strain_b * k.a.x + k.strain_a * k.b.x;
     grown.y += k.strain_b * k.a.y + k.strain_a * k.b.y;
     grown.along += k.strain_b * k.a.along + k.strain_a * k.b.along;
@@ -102,8 +105,21 @@ void prepare(const ArmParameters& arm, const Inputs& in, int begin, Segments& k)
   }
   if constexpr (kArc) own_arc(grown, k);
   if constexpr (kExtensible && kInertia) {
-    add_strain<kArc>(load_strain_rate(in.x + first_of, count, k.inverse_length), k);
+    add_strain<kArc>(number(in.x, 2) * k.inverse_length, k);
   }
+}
+
+/// What segments `begin` ... `begin + 3` do within their own frames; lanes beyond the last segment
+/// are straight and weigh nothing.
+template <MassModel kMass, bool kInertia, bool kCoriolis, class Segments>
+void prepare(const ArmParameters& arm, const Inputs& in, int begin, Segments& k) noexcept {
+  constexpr bool kArc = kMass == MassModel::distributed && (kInertia || kCoriolis);
+  constexpr int kWidth = kCoordinates<Segments::kExtensible>;
+  const int count = arm.size() - begin;
+  load_shape<kArc>(arm, begin, in.u, k);
+  const int first_of = kWidth * begin;
+  const auto number = [=](const double* v, int e) { return load(v + first_of + e, kWidth, count); };
+  set_own_motion<kMass, kInertia, kCoriolis>(in, number, k);
 }
 
 /// Motion of the frame S_{i-1}, in its own coordinates.
@@ -235,7 +251,7 @@ void add_rotary_inertia(const SegmentParameters& segment, const double* x, int l
     motion.b = lane(k.b, l);
   }
   if constexpr (kInertia) {
-    motion.x = direction(motion.ux, motion.uy, T(x[0]), T(x[1]));
+    motion.x = direction(motion.ux, motion.uy, x[0], x[1]);
   }
   const auto discs = disc_forces(0.25 * segment.mass_kg * r * r, motion);
   out.moment += discs.moment;
@@ -246,7 +262,7 @@ void add_rotary_inertia(const SegmentParameters& segment, const double* x, int l
 template <MassModel kMass, class Segments, class S, class Frame, class Forces>
 SOFTARM_INLINE void own_forces(const Segments& k, int l, const Vec3<S>& base, const Frame& f,
                                Forces& out) noexcept {
-  const double mass = k.mass[l];
+  const double mass = at(k.mass, l);
   out.force = mass * acceleration(at(k.centre.p, l), at(k.centre.q, l), at(k.centre.p1, l),
                                   at(k.centre.q1, l), base + lane(k.own_centre, l), f);
   if constexpr (kMass == MassModel::point) {
@@ -256,22 +272,33 @@ SOFTARM_INLINE void own_forces(const Segments& k, int l, const Vec3<S>& base, co
   }
 }
 
-/// From S_{i-1} to S_i.
-template <bool kCoriolis, class Segments, class Frame, class S, class R>
-SOFTARM_INLINE void advance(const Segments& k, int l, const Frame& f, const FrameMotionOf<S>& m,
-                            FrameMotionOf<R>& next) noexcept {
-  const auto to_next = turn(k, l);
-  next.linear =
-      rotate_back(to_next, acceleration(at(k.tip.p, l), at(k.tip.q, l), at(k.tip.p1, l),
-                                        at(k.tip.q1, l), m.linear + lane(k.own_tip, l), f));
+/// Accelerations of S_i, still in the axes of S_{i-1}.
+template <class Segments, class Frame, class S>
+SOFTARM_INLINE auto end_acceleration(const Segments& k, int l, const Frame& f,
+                                     const FrameMotionOf<S>& m) noexcept {
+  return acceleration(at(k.tip.p, l), at(k.tip.q, l), at(k.tip.p1, l), at(k.tip.q1, l),
+                      m.linear + lane(k.own_tip, l), f);
+}
+template <bool kCoriolis, class Segments, class Frame, class S>
+SOFTARM_INLINE auto end_angular_acceleration(const Segments& k, int l, const Frame&,
+                                             const FrameMotionOf<S>& m) noexcept {
   auto angular = m.angular + lane(k.own_spin, l);
+  if constexpr (kCoriolis && !std::is_same_v<Frame, StillFrame>) {
+    angular += 0.5 * (cross(m.spin_a, lane(k.spin_b, l)) + cross(m.spin_b, lane(k.spin_a, l)));
+  }
+  return angular;
+}
+
+/// From S_{i-1} to S_i.
+template <bool kCoriolis, class Segments, class Frame, class S>
+SOFTARM_INLINE void advance(const Segments& k, int l, const Frame& f, const FrameMotionOf<S>& m,
+                            FrameMotionOf<S>& next) noexcept {
+  const auto to_next = turn(k, l);
+  next.linear = rotate_back(to_next, end_acceleration(k, l, f, m));
+  const auto angular = end_angular_acceleration<kCoriolis>(k, l, f, m);
   if constexpr (kCoriolis) {
-    const auto a = lane(k.spin_a, l), b = lane(k.spin_b, l);
-    if constexpr (!std::is_same_v<Frame, StillFrame>) {
-      angular += 0.5 * (cross(m.spin_a, b) + cross(m.spin_b, a));
-    }
-    next.spin_a = rotate_back(to_next, m.spin_a + a);
-    next.spin_b = rotate_back(to_next, m.spin_b + b);
+    next.spin_a = rotate_back(to_next, m.spin_a + lane(k.spin_a, l));
+    next.spin_b = rotate_back(to_next, m.spin_b + lane(k.spin_b, l));
   }
   next.angular = rotate_back(to_next, angular);
 }

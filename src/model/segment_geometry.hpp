@@ -38,15 +38,18 @@ inline CurveOf<typename Functions::value_type> centre_curve(const Length& length
           length * (8.0 * c[6] - 5.0 * c[5] + c[4])};
 }
 
-/// A direction of u beside u itself, with u . a, which everything below shares.
-template <class T>
+/// A direction of u beside u itself, with u . a, which everything below shares. Its own components
+/// may be plain numbers where u has tangents.
+template <class T, class Component = T>
 struct DirectionOf {
-  T x, y, along;
+  Component x, y;
+  T along;
 };
 using Direction = DirectionOf<double>;
 
-template <class T>
-inline DirectionOf<T> direction(T ux, T uy, T x, T y) noexcept {
+template <class T, class Component>
+inline DirectionOf<T, Component> direction(const T& ux, const T& uy, const Component& x,
+                                           const Component& y) noexcept {
   return {x, y, ux * x + uy * y};
 }
 
@@ -56,17 +59,17 @@ inline Vec3<T> point(const CurveOf<T>& f, T ux, T uy) noexcept {
 }
 
 /// Derivative of the point along a.
-template <class T>
-inline Vec3<T> first(const CurveOf<T>& f, T ux, T uy, const DirectionOf<T>& a) noexcept {
+template <class T, class Component>
+inline Vec3<T> first(const CurveOf<T>& f, T ux, T uy, const DirectionOf<T, Component>& a) noexcept {
   const T stretch = f.p1 * a.along;
   return {f.p * a.x + stretch * ux, f.p * a.y + stretch * uy, f.q1 * a.along};
 }
 
 /// Mixed second derivative of the point along a and b.
-template <class T>
-inline Vec3<T> second(const CurveOf<T>& f, T ux, T uy, const DirectionOf<T>& a,
-                      const DirectionOf<T>& b) noexcept {
-  const T ab = a.x * b.x + a.y * b.y;
+template <class T, class Component>
+inline Vec3<T> second(const CurveOf<T>& f, T ux, T uy, const DirectionOf<T, Component>& a,
+                      const DirectionOf<T, Component>& b) noexcept {
+  const Component ab = a.x * b.x + a.y * b.y;
   const T both = a.along * b.along;
   const T stretch = f.p1 * ab + f.p2 * both;
   return {f.p1 * (b.along * a.x + a.along * b.x) + stretch * ux,
@@ -127,17 +130,17 @@ inline auto spin(const Functions& c) noexcept {
   return SpinOf<T>{c[1], c[2], c[3], c[3] - 0.5 * c[2], 3.0 * c[5] - c[4], c[4] - 0.5 * c[3]};
 }
 
-template <class T>
-inline Vec3<T> first(const SpinOf<T>& w, T ux, T uy, const DirectionOf<T>& a) noexcept {
+template <class T, class Component>
+inline Vec3<T> first(const SpinOf<T>& w, T ux, T uy, const DirectionOf<T, Component>& a) noexcept {
   const T along = w.c3 * a.along;
   return {-(w.c1 * a.y + along * uy), w.c1 * a.x + along * ux, w.c2 * (ux * a.y - uy * a.x)};
 }
 
 /// Symmetrized second derivative: the axial vector of (d2R/dadb) R^T, halved over both orders.
-template <class T>
-inline Vec3<T> second(const SpinOf<T>& w, T ux, T uy, const DirectionOf<T>& a,
-                      const DirectionOf<T>& b) noexcept {
-  const T ab = a.x * b.x + a.y * b.y;
+template <class T, class Component>
+inline Vec3<T> second(const SpinOf<T>& w, T ux, T uy, const DirectionOf<T, Component>& a,
+                      const DirectionOf<T, Component>& b) noexcept {
+  const Component ab = a.x * b.x + a.y * b.y;
   const T along = w.c3 * ab + w.c3_1 * a.along * b.along;
   const T x = w.mixed * (b.along * a.x + a.along * b.x) + along * ux;
   const T y = w.mixed * (b.along * a.y + a.along * b.y) + along * uy;

@@ -11,16 +11,22 @@
 
 namespace softarm {
 
-/// Shape of four segments, each in its own S_{i-1}. L: Lanes, or with their tangents along the
-/// segments' own coordinates.
+/// What a segment's shape has of s = u . u and its length.
 template <class L>
-struct ShapeLanesOf {
-  using Lane = L;
-  L ux, uy, c0;
-  Lanes mass;
+struct ShapeFunctionsOf {
+  L c0;
   CurveOf<L> tip, centre;
   SpinOf<L> turn_rate;
   ArcMomentsOf<L> arc;  ///< only where mass is distributed
+};
+
+/// Shape of four segments, each in its own S_{i-1}; or of one, L then being a number with its
+/// tangents along the segment's own coordinates.
+template <class L>
+struct ShapeLanesOf : ShapeFunctionsOf<L> {
+  using Lane = L;
+  L ux, uy;
+  PlainOf<L> mass;
 };
 using ShapeLanes = ShapeLanesOf<Lanes>;
 
@@ -34,47 +40,53 @@ inline Lanes load(const double* v, int stride, int count) noexcept {
                count > 3 ? v[3 * stride] : 0.0};
 }
 
-/// The coordinate k of four segments: with tangents, the one along itself is 1.
-template <class L>
-inline L coordinate(const Lanes& value, std::size_t k) noexcept {
-  L out(value);
-  if constexpr (!std::is_same_v<L, Lanes>) out.d.along[k] = Lanes{1.0, 1.0, 1.0, 1.0};
-  return out;
+/// Of the segments from `begin` on, whose coordinates are at q. Lanes beyond the last segment weigh
+/// nothing.
+struct LengthsAndMasses {
+  Lanes length, mass;
+
+  template <bool kExtensible>
+  static LengthsAndMasses load_from(const ArmParameters& arm, int begin, const double* q) noexcept {
+    static_assert(sizeof(SegmentParameters) % sizeof(double) == 0);
+    constexpr int kStride = sizeof(SegmentParameters) / sizeof(double);
+    const int count = arm.size() - begin;
+    const SegmentParameters& segment = arm.segments[static_cast<std::size_t>(begin)];
+    Lanes length = load(&segment.length_m, kStride, count);
+    if constexpr (kExtensible) length += load(q + 2, 3, count);
+    return {length, load(&segment.mass_kg, kStride, count)};
+  }
+};
+
+template <bool kArc, class L>
+inline void set_functions(const LengthsAndMasses& of, const L& s, ShapeFunctionsOf<L>& k) noexcept {
+  const auto c = entire < kArc ? 12 : 8 > (s);
+  k.c0 = c[0];
+  k.tip = tip_curve(of.length, c);
+  k.centre = centre_curve(of.length, c);
+  k.turn_rate = spin(c);
+  if constexpr (kArc) k.arc = arc_moments(of.mass * of.length * of.length, s, c);
 }
 
 /// Fills everything but ux and uy, which the caller has set, for the segments from `begin` on,
 /// whose coordinates are at q, and returns their lengths. Lanes beyond the last segment are straight
 /// and weigh nothing.
-template <bool kArc, bool kExtensible, class L>
-inline auto set_shape(const ArmParameters& arm, int begin, const double* q,
-                      ShapeLanesOf<L>& k) noexcept {
-  static_assert(sizeof(SegmentParameters) % sizeof(double) == 0);
-  constexpr int kStride = sizeof(SegmentParameters) / sizeof(double);
-  const int count = arm.size() - begin;
-  const SegmentParameters& segment = arm.segments[static_cast<std::size_t>(begin)];
-  std::conditional_t<kExtensible, L, Lanes> length = load(&segment.length_m, kStride, count);
-  if constexpr (kExtensible) length += coordinate<L>(load(q + 2, 3, count), 2);
-  const L s = k.ux * k.ux + k.uy * k.uy;
-  const auto c = entire < kArc ? 12 : 8 > (s);
-  k.mass = load(&segment.mass_kg, kStride, count);
-  k.c0 = c[0];
-  k.tip = tip_curve(length, c);
-  k.centre = centre_curve(length, c);
-  k.turn_rate = spin(c);
-  if constexpr (kArc) k.arc = arc_moments(k.mass * length * length, s, c);
-  return length;
+template <bool kArc, bool kExtensible>
+inline Lanes set_shape(const ArmParameters& arm, int begin, const double* q,
+                       ShapeLanes& k) noexcept {
+  const auto of = LengthsAndMasses::load_from<kExtensible>(arm, begin, q);
+  k.mass = of.mass;
+  set_functions<kArc>(of, k.ux * k.ux + k.uy * k.uy, k);
+  return of.length;
 }
 
 /// Rates at v: those of u.
-template <bool kExtensible, class L>
-inline DirectionOf<L> load_direction(const double* v, int count,
-                                     const ShapeLanesOf<L>& k) noexcept {
+template <bool kExtensible>
+inline DirectionOf<Lanes> load_direction(const double* v, int count, const ShapeLanes& k) noexcept {
   constexpr int kWidth = kCoordinates<kExtensible>;
-  return direction(k.ux, k.uy, L(load(v, kWidth, count)), L(load(v + 1, kWidth, count)));
+  return direction(k.ux, k.uy, load(v, kWidth, count), load(v + 1, kWidth, count));
 }
 /// Rates at v: that of e over the length.
-template <class L>
-inline L load_strain_rate(const double* v, int count, const L& inverse_length) noexcept {
+inline Lanes load_strain_rate(const double* v, int count, const Lanes& inverse_length) noexcept {
   return load(v + 2, 3, count) * inverse_length;
 }
 
@@ -90,9 +102,10 @@ inline auto lane(const Vec3<L>& v, int l) noexcept {
 inline Curve lane(const CurveOf<Lanes>& f, int l) noexcept {
   return {f.p[l], f.q[l], f.p1[l], f.q1[l], f.p2[l], f.q2[l]};
 }
-template <class L>
-inline auto lane(const DirectionOf<L>& d, int l) noexcept {
-  return DirectionOf<decltype(at(d.x, l))>{at(d.x, l), at(d.y, l), at(d.along, l)};
+template <class L, class Component>
+inline auto lane(const DirectionOf<L, Component>& d, int l) noexcept {
+  return DirectionOf<decltype(at(d.along, l)), decltype(at(d.x, l))>{at(d.x, l), at(d.y, l),
+                                                                     at(d.along, l)};
 }
 inline Spin lane(const SpinOf<Lanes>& w, int l) noexcept {
   return {w.c1[l], w.c2[l], w.c3[l], w.mixed[l], w.c3_1[l], w.c2_1[l]};
@@ -111,7 +124,7 @@ template <class L>
 struct SegmentLanesOf : ShapeLanesOf<L> {
   static constexpr bool kExtensible = false;
 
-  DirectionOf<L> a, b;
+  DirectionOf<L, PlainOf<L>> a, b;
   Vec3<L> spin_a, spin_b;  ///< angular velocity of S_i relative to S_{i-1} along a, b
   Vec3<L> own_tip, own_centre, own_spin;  ///< accelerations, the last one angular
   /// Distributed mass: integrals of P, Q and (P1 u, Q1) times the acceleration.
@@ -132,13 +145,12 @@ using LanesOf = std::conditional_t<kExtensible, ExtensibleLanesOf<L>, SegmentLan
 /// Shape of the segments from `begin` on: u is that of the whole arm.
 template <bool kArc, class Segments>
 inline void load_shape(const ArmParameters& arm, int begin, const double* u, Segments& k) noexcept {
-  using L = typename Segments::Lane;
   constexpr int kWidth = kCoordinates<Segments::kExtensible>;
   const int count = arm.size() - begin;
   const double* const q = u + kWidth * begin;
-  k.ux = coordinate<L>(load(q, kWidth, count), 0);
-  k.uy = coordinate<L>(load(q + 1, kWidth, count), 1);
-  const auto length = set_shape<kArc, Segments::kExtensible>(arm, begin, q, k);
+  k.ux = load(q, kWidth, count);
+  k.uy = load(q + 1, kWidth, count);
+  const Lanes length = set_shape<kArc, Segments::kExtensible>(arm, begin, q, k);
   if constexpr (Segments::kExtensible) k.inverse_length = 1.0 / length;
 }
 

@@ -25,6 +25,19 @@ struct PythonBenchOptions {
   bool json = false;
 };
 
+std::string as_json(const PythonPeers& peers, const std::vector<DerivativeCost>& costs) {
+  std::string rows;
+  for (const DerivativeCost& cost : costs) {
+    rows += fmt::format(
+        R"({}{{"stretching":{},"segments":{},"forward_us":{},"derivatives_us":{},"forward_ratio":{},"static_ratio":{}}})",
+        rows.empty() ? "" : ",", cost.stretching, cost.segments, cost.forward_us,
+        cost.derivatives_us, cost.forward_ratio, cost.static_ratio);
+  }
+  return fmt::format(
+      R"({{"controller_us":{},"tick_us":{},"forward_us":{},"derivatives_us":{},"derivatives":[{}]}})",
+      peers.controller_us, peers.tick_us, peers.forward_us, peers.derivatives_us, rows);
+}
+
 /// Replaces this program; returns only where that fails.
 int bench(const PythonBenchOptions& options) {
   const PythonPeers cpp = time_python_peers(load_experiment(options.config));
@@ -34,14 +47,12 @@ int bench(const PythonBenchOptions& options) {
   const auto built =
       std::filesystem::read_symlink("/proc/self/exe", error).parent_path().parent_path() / "python";
   if (std::filesystem::exists(built / "softarm", error)) ::setenv("PYTHONPATH", built.c_str(), 1);
-  std::vector<std::string> words = {
-      python,
-      shared_file("python_bench.py", SOFTARM_PYTHON_BENCH),
-      options.config,
-      std::to_string(options.seconds),
-      fmt::format(R"({{"controller_us":{},"tick_us":{},"forward_us":{},"derivatives_us":{}}})",
-                  cpp.controller_us, cpp.tick_us, cpp.forward_us, cpp.derivatives_us),
-      options.json ? "json" : "table"};
+  std::vector<std::string> words = {python,
+                                    shared_file("python_bench.py", SOFTARM_PYTHON_BENCH),
+                                    options.config,
+                                    std::to_string(options.seconds),
+                                    as_json(cpp, time_derivatives()),
+                                    options.json ? "json" : "table"};
   if (!options.soromox.empty()) words.push_back(options.soromox);
   std::vector<char*> pointers;
   for (std::string& word : words) pointers.push_back(word.data());

@@ -3,7 +3,6 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
-#include <algorithm>
 #include <vector>
 
 namespace softarm {
@@ -62,12 +61,6 @@ struct ArmParameters {
   /// stretches with the segment, radius_m stays. All 2n below become 3n. Only `chamber` actuation.
   bool extensible = false;
 
-  /// Does a cross-section have rotary inertia?
-  bool is_thick() const {
-    return mass == MassModel::distributed &&
-           std::any_of(segments.begin(), segments.end(),
-                       [](const SegmentParameters& segment) { return segment.radius_m > 0.0; });
-  }
   int size() const { return static_cast<int>(segments.size()); }
   int segment_dof() const { return extensible ? 3 : 2; }
   int dof() const { return segment_dof() * size(); }

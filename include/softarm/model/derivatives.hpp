@@ -1,9 +1,10 @@
 // Exact derivatives of the dynamics (16) and of statics: what optimal control, estimation and
 // identification linearise with.
 //
-// Each segment's own terms are evaluated in dual numbers along its two or three coordinates and
-// carried through the recursion of `inverse_dynamics`, so there is no step to choose: O(n^2), good
-// to round-off of the terms themselves.
+// What a segment does within its own frame is differentiated in dual numbers along its two or three
+// coordinates. To everything else a change of them is a motion of one rigid body, whose effect on
+// every other segment is linear in the moments and momenta that B and C are made of: O(n^2), with no
+// step to choose, good to round-off of the terms themselves.
 #pragma once
 
 #include <Eigen/Core>

@@ -168,6 +168,7 @@ def measure(config, seconds, cpp, soromox_python):
         "derivatives_us": statistics.median(rows["derivatives"]),
         "derivatives_cpp_us": cpp["derivatives_us"],
         "two_threads_over_one": median_ratio("one thread", "two threads"),
+        "derivatives": cpp["derivatives"],
     }
     if soromox:
         report["soromox_us"] = statistics.median(rows["soromox"])
@@ -191,6 +192,10 @@ def table(r):
             f" ({r['soromox_over_forward_best_wall']:.0f} times by the clock, the quickest calls of each);"
             f" the same arm to {r['difference']:.1e}"
         )
+    lines.append("times one evaluation, in C++            segments: " + "".join(f"{row['segments']:6}" for row in r["derivatives"][:4]))
+    for text, ratio in (("forward dynamics and its derivatives", "forward_ratio"), ("static stiffness over static moments", "static_ratio")):
+        for kind, rows in (("", r["derivatives"][:4]), (", stretching", r["derivatives"][4:])):
+            lines.append(f"{text + kind:50}" + "".join(f"{row[ratio]:6.1f}" for row in rows))
     lines.append(f"{PLANTS} simulated arms, two threads over one: {r['two_threads_over_one']:.2f}")
     return "\n".join(lines)
 
