@@ -177,8 +177,7 @@ class Checks {
     require(plant.arm.actuation == ActuationModel::chamber, "plant.arm.extensible",
             "false with actuation_model: couple, which has no axial force",
             "segments that stretch");
-    check_module("plant.arm.extensible", "a kind of plant whose segments can stretch, such as pcc",
-                 make);
+    check_module("plant.arm.extensible", "a kind of plant whose segments can stretch", make);
   }
 
   void check_actuation(const std::string& key, const ActuationSettings& it) const {

@@ -287,12 +287,11 @@ SegmentVector ArmPlant::velocity_radps() const noexcept {
   return velocity;
 }
 
-// Only of kinds with one piece a segment may segments stretch.
 SegmentScalars ArmPlant::elongation_m() const noexcept {
-  return stretch_part(implementation_->arm, implementation_->integrator->x());
+  return implementation_->system->elongation_m(implementation_->integrator->x());
 }
 SegmentScalars ArmPlant::elongation_rate_mps() const noexcept {
-  return stretch_part(implementation_->arm, implementation_->integrator->v());
+  return implementation_->system->elongation_m(implementation_->integrator->v());
 }
 
 const Eigen::VectorXd& ArmPlant::pressures_bar() const noexcept {

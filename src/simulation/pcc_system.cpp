@@ -16,7 +16,7 @@ std::unique_ptr<PlantSystem> PccSettings::make(const PlantSettings& settings) co
 }
 
 PccSystem::PccSystem(const PlantSettings& settings, const ArmParameters& arm, int pieces)
-    : PlantSystem(settings, pieces == 1, pieces == 1),
+    : PlantSystem(settings, true, pieces == 1),
       segments_(settings.arm.size()),
       pieces_(pieces),
       width_(arm.segment_dof()),
@@ -140,9 +140,13 @@ void PccSystem::feel_base(double t_s) {
 void PccSystem::add_input(double t_s, ConstVector u, Vector out) {
   const bool couple = arm_.actuation == ActuationModel::couple;
   const Eigen::VectorXd& force = input_.force_nm(t_s);
-  if (arm_.extensible) out += force;  // one piece a segment, and no couple
-  for (int i = 0; i < segments_ && !arm_.extensible; ++i) {
+  for (int i = 0; i < segments_; ++i) {
     const int first = i * pieces_;
+    if (arm_.extensible) {  // and no couple
+      for (int j = first; j < first + pieces_; ++j)
+        out.segment<3>(3 * j) += force.segment<3>(3 * i);
+      continue;
+    }
     if (!couple) {
       for (int j = first; j < first + pieces_; ++j) {
         out.segment<2>(2 * j) += force.segment<2>(2 * i);
@@ -287,10 +291,11 @@ void PccSystem::curvature(ConstVector x, ConstVector v, Vector u, Vector rate) c
     Eigen::Vector3d chord = Eigen::Vector3d::Zero();
     Eigen::Vector3d angular = Eigen::Vector3d::Zero();
     for (int j = i * pieces_; j < (i + 1) * pieces_; ++j) {
-      const Eigen::Vector2d bend = x.segment<2>(2 * j);
-      const double length = arm_.segments[static_cast<std::size_t>(j)].length_m;
+      const Eigen::Vector2d bend = x.segment<2>(width_ * j);
+      const double elongation = arm_.extensible ? x[3 * j + 2] : 0.0;
+      const double length = arm_.segments[static_cast<std::size_t>(j)].length_m + elongation;
       chord += rotation * segment_tip(length, bend);
-      angular += rotation * (segment_angular_jacobian(bend) * v.segment<2>(2 * j));
+      angular += rotation * (segment_angular_jacobian(bend) * v.segment<2>(width_ * j));
       rotation = rotation * segment_rotation(bend);
     }
     Eigen::Vector2d bend, bend_rate;

@@ -13,8 +13,8 @@
 namespace softarm {
 
 /// r = B u'' + C u' + D u' + G + K u - A tau_A(t) - J' f_ext, where u are the curvatures of all
-/// pieces: the kinds pcc and refined. Of an arm that is extensible, one piece a segment, (u, e); r is
-/// NaN where a segment would have no length left. `MaterialSettings` add to K u of one-piece segments;
+/// pieces: the kinds pcc and refined. Of an arm that is extensible (u, e) of all pieces; r is NaN
+/// where one would have no length left. `MaterialSettings` add to K u of one-piece segments;
 /// what relaxes is held while a step is made. The moment of a segment's chambers follows
 /// the body and acts on each of its pieces alike; the paper's couple has fixed axes, those of the
 /// segment's start, and acts between there and the segment's end.

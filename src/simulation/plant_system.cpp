@@ -100,6 +100,15 @@ void PlantSystem::curvature(ConstVector x, ConstVector v, Vector u, Vector rate)
   }
 }
 
+SegmentScalars PlantSystem::elongation_m(ConstVector x) const {
+  SegmentScalars out;
+  if (!segments_arm_.extensible) return out;
+  const Eigen::Index n = segments_arm_.size(), parts = x.size() / (3 * n);
+  out.setZero(n);
+  for (Eigen::Index j = 0; j < n * parts; ++j) out[j / parts] += x[3 * j + 2];
+  return out;
+}
+
 PlantShape PlantSystem::shape(ConstVector x) const {
   Eigen::VectorXd u(segments_arm_.dof()), rate(segments_arm_.dof());
   curvature(x, Eigen::VectorXd::Zero(x.size()), u, rate);

@@ -48,9 +48,10 @@ void RefinedSettings::describe(Keys& key) {
 }
 
 std::unique_ptr<PlantSystem> RefinedSettings::make(const PlantSettings& settings) const {
-  if (pieces < 1 || pieces * settings.arm.size() > kMaxSegments) {
-    throw std::invalid_argument("plant.refined.pieces: expected 1 to " +
-                                std::to_string(kMaxSegments) + " pieces in the whole arm of " +
+  const int most = settings.arm.extensible ? kMaxStretchingSegments : kMaxSegments;
+  if (pieces < 1 || pieces * settings.arm.size() > most) {
+    throw std::invalid_argument("plant.refined.pieces: expected 1 to " + std::to_string(most) +
+                                " pieces in the whole arm of " +
                                 std::to_string(settings.arm.size()) + " segments, got " +
                                 std::to_string(pieces) + " a segment");
   }
@@ -68,7 +69,10 @@ std::unique_ptr<PlantSystem> RefinedSettings::make(const PlantSettings& settings
                               .mass_kg = segment.mass_kg * mass[j],
                               .stiffness_nm_per_rad = segment.stiffness_nm_per_rad * stiffer,
                               .damping_nms_per_rad = segment.damping_nms_per_rad * stiffer,
-                              .radius_m = segment.radius_m});
+                              .radius_m = segment.radius_m,
+                              .axial_stiffness_n_per_m = segment.axial_stiffness_n_per_m * stiffer,
+                              .axial_damping_ns_per_m = segment.axial_damping_ns_per_m * stiffer,
+                              .constant_length = segment.constant_length});
     }
   }
   return std::make_unique<PccSystem>(settings, arm, pieces);

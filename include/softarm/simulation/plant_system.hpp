@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "softarm/model/arm.hpp"
+#include "softarm/model/coordinates.hpp"
 #include "softarm/simulation/actuator_input.hpp"
 #include "softarm/simulation/external_loads.hpp"
 #include "softarm/simulation/second_order_system.hpp"
@@ -52,6 +53,9 @@ class PlantSystem : public SecondOrderSystem {
   virtual double kinetic_energy_j(ConstVector x, ConstVector v);
   /// u and u' (2n) of the PCC arm whose segments' ends are turned as this arm's are.
   virtual void curvature(ConstVector x, ConstVector v, Vector u, Vector rate) const;
+  /// Of every segment (n, m) by how much it is longer than at rest, linear in x: rates alike. Empty
+  /// where the arm does not stretch. By default the sum of every third coordinate of its parts.
+  virtual SegmentScalars elongation_m(ConstVector x) const;
   /// Of the PCC arm of these u.
   virtual PlantShape shape(ConstVector x) const;
 

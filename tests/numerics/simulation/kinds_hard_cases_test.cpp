@@ -87,6 +87,12 @@ std::vector<KindCase> kind_cases() {
       {"links_dead_time", with_dead_time(arm_of(kLinks, 3, 6)), 0.3, one_side(3)},
       {"refined_through_pi", by_torque(kRefined, 6), 0.5, {0.0, 2.4}},
       {"links_through_pi", by_torque(kLinks, 6), 0.5, {0.0, 2.4}},
+      {"stretching_refined_release_from_2_rad", stretching(arm_of(kRefined, 3, 4, 2.0)), 0.3, {}},
+      {"stretching_refined_two_bar_on_one_side", stretching(arm_of(kRefined, 2, 4)), 0.3,
+       one_side(2)},
+      {"stretching_links_release_from_2_rad", stretching(arm_of(kLinks, 3, 6, 2.0)), 0.3, {}},
+      {"stretching_links_two_bar_on_one_side", stretching(arm_of(kLinks, 3, 6)), 0.3, one_side(3)},
+      {"stretching_links_blow", with_blow(stretching(arm_of(kLinks, 3, 6))), 0.3, {}},
       {"twenty_four_links", section_six(), 0.5, one_side(4)},
       {"twenty_four_point_links", section_six(MassModel::point), 0.5, one_side(4)},
   };

@@ -38,6 +38,58 @@ TEST(ExtensiblePlant, HangsAsLongAsItsWeightMakesIt) {
   }
 }
 
+TEST(ExtensiblePlant, PartsHangAndStretchTogetherAsTheSegmentDoes) {
+  // The sum of what the parts carry is what the segment carries, for any number of them.
+  PlantSettings settings = stretching(paper_arm());
+  settings.arm.segments[1].constant_length = true;
+  ArmPlant pcc(settings);
+  pcc.advance(1.0, none(3));
+  for (const MakeKind make : {kRefined, kLinks}) {
+    settings.kind = make(5);
+    ArmPlant parts(settings);
+    parts.advance(1.0, none(3));
+    ASSERT_EQ(parts.dof(), 45);
+    EXPECT_LE((parts.elongation_m() - pcc.elongation_m()).cwiseAbs().maxCoeff(), 1e-9);
+    EXPECT_EQ(parts.elongation_m()[1], 0.0);
+    EXPECT_NEAR((parts.tip_m() - pcc.tip_m()).norm(), 0.0, 1e-9);
+  }
+}
+
+TEST(ExtensiblePlant, UniformForcesStretchPartsAlike) {
+  // Without weight the model is exact: pieces are arcs of one circle, links chords near it.
+  PlantSettings settings = stretching(paper_arm(MassModel::distributed, 1));
+  settings.arm.gravity_mps2.setZero();
+  const std::vector<double> pressures = {0.6, 0.0, 0.0, 0.4};
+  const auto rest = [&](MakeKind make, int parts) {
+    settings.kind = make(parts);
+    ArmPlant plant(settings);
+    plant.advance(5.0, pressures);
+    return plant;
+  };
+  const ArmPlant pcc = rest(kPcc, 1), refined = rest(kRefined, 4);
+  EXPECT_GT(pcc.elongation_m().minCoeff(), 1e-3);
+  EXPECT_LE((refined.u_rad() - pcc.u_rad()).cwiseAbs().maxCoeff(), 1e-6);
+  EXPECT_LE((refined.elongation_m() - pcc.elongation_m()).cwiseAbs().maxCoeff(), 1e-8);
+  EXPECT_LE((refined.tip_m() - pcc.tip_m()).norm(), 1e-6);
+  const ArmPlant six = rest(kLinks, 6), twelve = rest(kLinks, 12);
+  EXPECT_LE((six.elongation_m() - pcc.elongation_m()).cwiseAbs().maxCoeff(), 1e-8);
+  EXPECT_NEAR((six.tip_m() - pcc.tip_m()).norm() / (twelve.tip_m() - pcc.tip_m()).norm(), 2.0, 0.1);
+}
+
+TEST(ExtensiblePlant, LinksMoveMoreAndMoreAsPiecesDo) {
+  const auto tip = [](MakeKind make, int parts) {
+    PlantSettings settings = stretching(paper_arm(MassModel::distributed, 1));
+    settings.kind = make(parts);
+    settings.initial_u_rad = Eigen::Vector2d(0.6, 0.2);
+    ArmPlant plant(settings);
+    plant.advance(0.1, std::vector<double>{0.0, 0.8, 0.0, 0.0});
+    return plant.tip_m();
+  };
+  const Eigen::Vector3d finest = tip(kRefined, 24);
+  const double of_6 = (tip(kLinks, 6) - finest).norm(), of_12 = (tip(kLinks, 12) - finest).norm();
+  EXPECT_NEAR(of_6 / of_12, 2.0, 0.15);
+}
+
 TEST(ExtensiblePlant, ChamberStretchesAsItBends) {
   // Without gravity k theta = g p and k_a e = g p / r.
   PlantSettings settings = stretching(paper_arm(MassModel::distributed, 1));
@@ -112,21 +164,22 @@ TEST(ExtensiblePlant, SegmentsOfConstantLengthDoNotStretch) {
 }
 
 TEST(ExtensiblePlant, SegmentCrushedToNothingIsAnError) {
-  PlantSettings settings = stretching(paper_arm(MassModel::distributed, 1));
-  settings.arm.segments[0].axial_stiffness_n_per_m = 10.0;
-  settings.tip_force_n = {0.0, 0.0, 100.0};  // upwards: towards the base
-  ArmPlant plant(settings);
-  EXPECT_THROW(plant.advance(5.0, none(1)), PlantError);
-  EXPECT_TRUE(plant.coordinates().allFinite());
-  EXPECT_GT(settings.arm.segments[0].length_m + plant.coordinates()[2], 0.0);
+  for (const MakeKind make : {kPcc, kRefined, kLinks}) {
+    PlantSettings settings = stretching(paper_arm(MassModel::distributed, 1));
+    settings.kind = make(2);
+    settings.arm.segments[0].axial_stiffness_n_per_m = 10.0;
+    settings.tip_force_n = {0.0, 0.0, 100.0};  // upwards: towards the base
+    ArmPlant plant(settings);
+    EXPECT_THROW(plant.advance(5.0, none(1)), PlantError);
+    EXPECT_TRUE(plant.coordinates().allFinite());
+    EXPECT_GT(settings.arm.segments[0].length_m + plant.elongation_m()[0], 0.0);
+  }
 }
 
 TEST(ExtensiblePlant, RefusesWhatItCannotDo) {
-  for (const MakeKind make : {kRefined, kLinks}) {
-    PlantSettings settings = stretching(paper_arm());
-    settings.kind = make(4);
-    EXPECT_THROW(ArmPlant{settings}, std::invalid_argument);
-  }
+  PlantSettings too_many = stretching(paper_arm());
+  too_many.kind = kRefined(29);
+  EXPECT_THROW(ArmPlant{too_many}, std::invalid_argument);
   const auto refused = [](auto change) {
     PlantSettings settings = stretching(paper_arm());
     change(settings);

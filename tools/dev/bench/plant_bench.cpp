@@ -45,7 +45,8 @@ Trial rival(Scene scene) {
 std::vector<Trial> trials_of(const PlantSettings& settings, Scene scene) {
   using enum IntegratorMethod;
   const bool small = settings.kind.get_if<PccSettings>() != nullptr;
-  const bool soft = small && settings.arm.mass == MassModel::distributed;
+  const bool soft =
+      small && settings.arm.mass == MassModel::distributed && !settings.arm.extensible;
   std::vector<Trial> trials = {rival(scene), default_trial()};
   const auto add = [&](IntegratorMethod method, std::initializer_list<double> tolerances) {
     for (const double tolerance : tolerances) trials.push_back(trial_of(method, tolerance));

@@ -15,6 +15,7 @@ namespace softarm {
 namespace {
 
 constexpr double kHold_s = 1e-3;
+constexpr double kAxialForce_n = 30.0;  // mean and amplitude, where segments stretch
 constexpr int kHoldsPerSample = 20;
 
 /// A plant under the smooth drive or under a force held.
@@ -91,15 +92,18 @@ Eigen::VectorXd smooth_drive_nm(const PlantSettings& settings, double t_s) {
     const double phase = 2.0 * std::numbers::pi * 0.7 * t_s + i * std::numbers::pi / 3.0;
     const double moment =
         0.4 * settings.arm.segments[static_cast<std::size_t>(i)].stiffness_nm_per_rad * rise;
-    force.segment<2>(2 * i) << moment * std::sin(phase), moment * std::cos(phase);
+    const Eigen::Index first = i * settings.arm.segment_dof();
+    force.segment<2>(first) << moment * std::sin(phase), moment * std::cos(phase);
+    if (settings.arm.extensible) force[first + 2] = kAxialForce_n * rise * (1.0 + std::sin(phase));
   }
   return force;
 }
 
-PlantSettings bench_arm(const PlantKind& kind, MassModel mass) {
+PlantSettings bench_arm(const PlantKind& kind, MassModel mass, bool stretches) {
   PlantSettings settings;
   settings.kind = kind;
   settings.arm.mass = mass;
+  settings.arm.extensible = stretches;
   settings.arm.segments.assign(3, SegmentParameters{});
   if (kind.get_if<LinkSettings>() != nullptr) {
     settings.arm.segments.assign(4, {.length_m = 0.25,
@@ -111,10 +115,14 @@ PlantSettings bench_arm(const PlantKind& kind, MassModel mass) {
 }
 
 std::vector<BenchPlant> bench_plants() {
-  return {{"pcc point", bench_arm(PccSettings{}, MassModel::point)},
-          {"pcc distributed", bench_arm(PccSettings{}, MassModel::distributed)},
-          {"refined 3x8", bench_arm(RefinedSettings{}, MassModel::distributed)},
-          {"links 4x6", bench_arm(LinkSettings{}, MassModel::distributed)}};
+  return {
+      {"pcc point", bench_arm(PccSettings{}, MassModel::point)},
+      {"pcc distributed", bench_arm(PccSettings{}, MassModel::distributed)},
+      {"refined 3x8", bench_arm(RefinedSettings{}, MassModel::distributed)},
+      {"links 4x6", bench_arm(LinkSettings{}, MassModel::distributed)},
+      {"pcc that stretches", bench_arm(PccSettings{}, MassModel::distributed, true)},
+      {"refined 3x8 that stretches", bench_arm(RefinedSettings{}, MassModel::distributed, true)},
+      {"links 4x6 that stretch", bench_arm(LinkSettings{}, MassModel::distributed, true)}};
 }
 
 PlantRun run_plant(const PlantSettings& settings, Scene scene, const Trial& trial,
@@ -122,7 +130,7 @@ PlantRun run_plant(const PlantSettings& settings, Scene scene, const Trial& tria
   DrivenSystem system(settings, scene);
   const double absolute =
       trial.absolute_tolerance > 0.0 ? trial.absolute_tolerance : 1e-2 * trial.tolerance;
-  Eigen::VectorXd u = Eigen::VectorXd::Zero(settings.arm.dof());
+  Eigen::VectorXd u = Eigen::VectorXd::Zero(2 * settings.arm.size());
   if (scene == Scene::free) {
     for (int i = 0; i < settings.arm.size(); ++i) {
       u.segment<2>(2 * i) << 0.6 * std::cos(0.7 * i), 0.6 * std::sin(0.7 * i);

@@ -22,13 +22,15 @@ struct BenchPlant {
   PlantSettings settings;
 };
 
-/// pcc point and distributed (n = 3), refined (n = 3, 8 pieces), links (4 segments of 6).
+/// pcc point and distributed (n = 3), refined (n = 3, 8 pieces), links (4 segments of 6); of
+/// distributed mass these once more with segments that stretch.
 std::vector<BenchPlant> bench_plants();
 /// The paper's arm; of links, that of section VI.
-PlantSettings bench_arm(const PlantKind& kind, MassModel mass);
+PlantSettings bench_arm(const PlantKind& kind, MassModel mass, bool stretches = false);
 
 /// Generalized force on every segment i (2n, N m): 0.4 k_i (1 - exp(-(t / 0.3 s)^2)) (sin w_i,
-/// cos w_i), w_i = 2 pi 0.7 Hz t + i pi / 3.
+/// cos w_i), w_i = 2 pi 0.7 Hz t + i pi / 3. Where segments stretch also the axial force, rising
+/// alike, of 30 N (1 + sin w_i), and 3n numbers.
 Eigen::VectorXd smooth_drive_nm(const PlantSettings& settings, double t_s);
 
 /// How a run is made. Absolute tolerances are 1e-2 times the relative one in rad, and 10 times it
