@@ -173,6 +173,11 @@ class Checks {
     const auto make = [&] { plant.kind.make(plant); };
     if (plant.material.bends_otherwise())
       check_module("plant.material", "a kind of plant that has these terms, such as pcc", make);
+    for (const auto& [key, part] :
+         {std::pair("plant.material.axial_remanence", plant.material.axial_remanence),
+          std::pair("plant.material.axial_remanence_2", plant.material.axial_remanence_2)})
+      require(part == 0.0 || plant.arm.extensible, key, "0 where plant.arm.extensible is false",
+              fmt::format("{}", part));
     if (!plant.arm.extensible) return;
     require(plant.arm.actuation == ActuationModel::chamber, "plant.arm.extensible",
             "false with actuation_model: couple, which has no axial force",

@@ -272,6 +272,8 @@ static void describe_memory(Keys& key, IdentificationSettings& it, std::size_t c
   KEY(slip_stiffness_nm_per_rad, from(0, 1e4).list(), "of these springs");
   KEY(remanence, from(0, 1), "share of the bend by which the rest follows it");
   KEY(remanence_s, above(0, 1e4), "time constant of that");
+  KEY(remanence_2, from(0, 1), "the same with another time, from 0 at first");
+  KEY(remanence_2_s, above(0, 1e4), "that time");
   it.remanent_u_rad.resize(2 * n, 0.0);
   KEY(remanent_u_rad, from(-kTwoPi, kTwoPi).one_or_pairs(), "where the rest is at first, for that");
 }
@@ -292,6 +294,10 @@ static void describe_stretch(Keys& key, IdentificationSettings& it, std::size_t 
   KEY(stretch_friction_m, from(0, 1), "half width of a play between pressure and length");
   KEY(stretch_remanence, from(0, 10), "as remanence");
   KEY(stretch_remanence_s, above(0, 1e4), "as remanence_s");
+  KEY(stretch_remanence_2, from(0, 10), "as remanence_2");
+  KEY(stretch_remanence_2_s, above(0, 1e4), "as remanence_2_s");
+  KEY(stretch_set, from(0, 10), "part of the largest stretch by pressure so far that stays");
+  KEY(stretch_by_bend_m_per_rad2, from(-10, 10), "what a bend u adds to a length, by |u|^2");
 }
 
 static void describe_identification(Keys& key, IdentificationSettings& it, MotionLimits& limits,

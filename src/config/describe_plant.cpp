@@ -53,6 +53,11 @@ static void describe(Keys& key, MaterialSettings& it) {
   KEY(remanence, from(0, 100),
       "a Maxwell element beside K, in parts of K: bent, the arm stays bent");
   KEY(remanence_s, from(1e-3, 1e6), "time constant of its relaxation");
+  KEY(remanence_2, from(0, 100), "a second Maxwell element, of another time");
+  KEY(remanence_2_s, from(1e-3, 1e6), "time constant of the second");
+  KEY(axial_remanence, from(0, 100),
+      "the first one beside the axial stiffness of an arm that stretches, in parts of that");
+  KEY(axial_remanence_2, from(0, 100), "the second one, likewise");
   KEY(bouc_wen, from(0, 100),
       "hysteresis of the moment by Bouc and Wen beside K, in parts of K: bouc_wen K z");
   KEY(bouc_wen_rad, above(0, kTwoPi), "z follows the bend until it saturates at this");

@@ -47,10 +47,11 @@ const PlantSettings& checked(const PlantSettings& settings) {
   for (const double width : material.play_bar)
     expect(std::isfinite(width) && width >= 0.0, "material.play_bar >= 0", std::to_string(width));
   for (const double term :
-       {material.cubic_per_rad2, material.stiffening_per_bar, material.remanence})
+       {material.cubic_per_rad2, material.stiffening_per_bar, material.remanence,
+        material.remanence_2, material.axial_remanence, material.axial_remanence_2})
     expect(std::isfinite(term) && term >= 0.0, "terms of material >= 0", std::to_string(term));
-  expect(material.remanence == 0.0 || material.remanence_s > 0.0, "material.remanence_s > 0 s",
-         std::to_string(material.remanence_s));
+  expect(!material.relaxes() || (material.remanence_s > 0.0 && material.remanence_2_s > 0.0),
+         "times of remanence > 0 s in material", "others");
   expect(std::isfinite(material.bouc_wen) && material.bouc_wen >= 0.0, "material.bouc_wen >= 0",
          std::to_string(material.bouc_wen));
   expect(material.bouc_wen == 0.0 ||

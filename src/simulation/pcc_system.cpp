@@ -45,15 +45,14 @@ PccSystem::PccSystem(const PlantSettings& settings, const ArmParameters& arm, in
       chamber += count;
     }
   }
-  if (remembers()) {
-    for (Eigen::VectorXd* each : {&relaxed_rad_, &yielded_rad_, &yielded_at_rad_})
-      each->setZero(2 * segments_);
-  }
+  if (material_.bouc_wen != 0.0)
+    for (Eigen::VectorXd* each : {&yielded_rad_, &yielded_at_rad_}) each->setZero(2 * segments_);
   coriolis_.setZero(n, n);
   inertia_.setZero(n, n);
   const Eigen::VectorXd zero = Eigen::VectorXd::Zero(n), one = Eigen::VectorXd::Ones(n);
   add_impedance(arm_, one, zero, stiffness_);
   add_impedance(arm_, zero, one, damping_);
+  maxwell_ = maxwell_elements();
   for (int j = 0; j < arm_.size(); ++j) {
     const SegmentParameters& piece = arm_.segments[static_cast<std::size_t>(j)];
     const SegmentParameters& whole = settings.arm.segments[static_cast<std::size_t>(j / pieces_)];
@@ -64,6 +63,20 @@ PccSystem::PccSystem(const PlantSettings& settings, const ArmParameters& arm, in
                     : 1.0 / pieces_;
     if (arm_.extensible && piece.constant_length) held_.push_back(3 * j + 2);
   }
+}
+
+std::vector<PccSystem::MaxwellElement> PccSystem::maxwell_elements() const {
+  std::vector<MaxwellElement> out;
+  const auto add = [&](double part, double axial_part, double time_s) {
+    if (part == 0.0 && (axial_part == 0.0 || !arm_.extensible)) return;
+    MaxwellElement element{stiffness_, Eigen::VectorXd::Zero(arm_.dof()), time_s};
+    for (Eigen::Index c = 0; c < arm_.dof(); ++c)
+      element.stiffness[c] *= c % width_ == 2 ? axial_part : part;
+    out.push_back(std::move(element));
+  };
+  add(material_.remanence, material_.axial_remanence, material_.remanence_s);
+  add(material_.remanence_2, material_.axial_remanence_2, material_.remanence_2_s);
+  return out;
 }
 
 void PccSystem::add_couple(const Eigen::Vector2d& tau_nm, int first_piece, ConstVector u,
@@ -84,12 +97,11 @@ void PccSystem::add_material(double t_s, ConstVector u, Vector out) {
     const double k = arm_.segments[static_cast<std::size_t>(i)].stiffness_nm_per_rad;
     if (material_.stiffening_per_bar != 0.0)
       out.segment<2>(width_ * i) -= k * material_.stiffening_per_bar * pressure_sum_bar_[i] * bend;
-    if (material_.remanence != 0.0)
-      out.segment<2>(width_ * i) -=
-          k * material_.remanence * (bend - relaxed_rad_.segment<2>(2 * i));
     if (material_.bouc_wen != 0.0)
       out.segment<2>(width_ * i) -= k * material_.bouc_wen * yielded(i, bend);
   }
+  for (const MaxwellElement& element : maxwell_)
+    out -= element.stiffness.cwiseProduct(u - element.relaxed);
 }
 
 Eigen::Vector2d PccSystem::yielded(int segment, const Eigen::Vector2d& bend) const {
@@ -106,12 +118,11 @@ void PccSystem::add_cubic(ConstVector u, Vector out) const {
 }
 
 void PccSystem::remember(double passed_s, ConstVector u) {
-  const Remanence element{.share = 1.0, .time_s = material_.remanence_s};
-  for (int i = 0; i < segments_; ++i)
-    for (int axis = 0; axis < 2; ++axis) {
-      double& z = relaxed_rad_[2 * i + axis];
-      z = element.step(z, u[width_ * i + axis], passed_s);
-    }
+  for (MaxwellElement& element : maxwell_) {
+    const Remanence relaxation{.share = 1.0, .time_s = element.time_s};
+    for (Eigen::Index c = 0; c < u.size(); ++c)
+      element.relaxed[c] = relaxation.step(element.relaxed[c], u[c], passed_s);
+  }
   if (material_.bouc_wen == 0.0) return;
   for (int i = 0; i < segments_; ++i) {
     const Eigen::Vector2d bend = u.segment<2>(width_ * i);

@@ -38,7 +38,7 @@ class PccSystem final : public PlantSystem {
   void segment_ends(ConstVector x, std::span<Eigen::Isometry3d> ends) const override;
   void curvature(ConstVector x, ConstVector v, Vector u, Vector rate) const override;
   PlantShape shape(ConstVector x) const override { return arcs(arm_, x); }
-  bool remembers() const override { return material_.remanence > 0.0 || material_.bouc_wen > 0.0; }
+  bool remembers() const override { return !maxwell_.empty() || material_.bouc_wen > 0.0; }
   void remember(double passed_s, ConstVector u) override;
 
  private:
@@ -48,6 +48,12 @@ class PccSystem final : public PlantSystem {
   void add_input(double t_s, ConstVector u, Vector out);
   void add_couple(const Eigen::Vector2d& tau_nm, int first_piece, ConstVector u, Vector out) const;
   bool has_lengths(ConstVector u) const;
+  /// A spring behind a dashpot beside K, in every coordinate: its force is stiffness (u - relaxed).
+  struct MaxwellElement {
+    Eigen::VectorXd stiffness, relaxed;
+    double time_s;
+  };
+  std::vector<MaxwellElement> maxwell_elements() const;
   /// out -= what the material adds to K u, but for its cubic part: work done on the arm.
   void add_material(double t_s, ConstVector u, Vector out);
   /// z of Bouc and Wen of a segment that has come to this bend.
@@ -67,7 +73,8 @@ class PccSystem final : public PlantSystem {
   MaterialSettings material_;
   bool bends_otherwise_;
   Eigen::MatrixXd segment_sum_;  // n x chambers, ones where a chamber is the segment's
-  Eigen::VectorXd pressure_sum_bar_, relaxed_rad_;
+  Eigen::VectorXd pressure_sum_bar_;
+  std::vector<MaxwellElement> maxwell_;  // empty: none
   BoucWen bouc_wen_;
   Eigen::VectorXd yielded_rad_, yielded_at_rad_;  // z of Bouc and Wen, and u of that
   DynamicsWorkspace workspace_;

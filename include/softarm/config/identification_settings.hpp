@@ -26,12 +26,15 @@ struct IdentificationSettings {
   std::vector<double> cross_nm_per_bar;  ///< chambers x 2n
   std::vector<double> slip_radius_rad = {0.0}, slip_stiffness_nm_per_rad = {0.0};
   double remanence = 0.0, remanence_s = 30.0;
+  double remanence_2 = 0.0, remanence_2_s = 5.0;
   std::vector<double> remanent_u_rad;  ///< 2n
   // How the segments stretch. All gains 0: not known.
   std::vector<double> stretch_m_per_bar;  ///< chambers x n
   std::vector<double> stretch_length_m;   ///< n: without pressure
   std::vector<double> stretch_fill_s, stretch_vent_s, stretch_saturation_1pbar;
   double stretch_friction_m = 0.0, stretch_remanence = 0.0, stretch_remanence_s = 30.0;
+  double stretch_remanence_2 = 0.0, stretch_remanence_2_s = 5.0;
+  double stretch_set = 0.0, stretch_by_bend_m_per_rad2 = 0.0;
 };
 
 }  // namespace softarm

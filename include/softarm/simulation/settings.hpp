@@ -41,6 +41,11 @@ struct MaterialSettings {
   /// arm that was held bent comes back bent.
   double remanence = 0.0;
   double remanence_s = 10.0;
+  double remanence_2 = 0.0;  ///< a second one, of another time
+  double remanence_2_s = 2.0;
+  /// The same elements beside K_a of an arm that stretches, in parts of that: as its bend, its length
+  /// follows what was before, within the same times.
+  double axial_remanence = 0.0, axial_remanence_2 = 0.0;
   /// Hysteresis of the moment by Bouc and Wen (`BoucWen`), beside K: the moment bouc_wen K z.
   double bouc_wen = 0.0;
   double bouc_wen_rad = 0.1;  ///< its limit
@@ -49,8 +54,12 @@ struct MaterialSettings {
 
   /// The moment depends on more than u, u' and pressures behind valves.
   bool bends_otherwise() const {
-    return cubic_per_rad2 != 0.0 || stiffening_per_bar != 0.0 || remanence != 0.0 ||
-           bouc_wen != 0.0;
+    return cubic_per_rad2 != 0.0 || stiffening_per_bar != 0.0 || relaxes() || bouc_wen != 0.0;
+  }
+  /// Any of the Maxwell elements is there.
+  bool relaxes() const {
+    return remanence != 0.0 || remanence_2 != 0.0 || axial_remanence != 0.0 ||
+           axial_remanence_2 != 0.0;
   }
 };
 

@@ -50,11 +50,15 @@ void write_findings(const Experiment& experiment, const IdentifyCommand& command
   fmt::print("{} has the values found: softarm run {}\n", command.output, command.output);
 }
 
-void print_lengths(const ArmHypothesis& arm, const Experiment& experiment,
-                   const MotionRecord& record, const std::string& what) {
+void print_lengths(const ArmHypothesis& arm, const Experiment& experiment, MotionRecord record,
+                   const std::string& what) {
   if (!arm.elongation.given() || record.chord_m.rows() == 0) return;
   FitChoice lengths;
   lengths.elongation = lengths.chamber_lags = true;  // every lag as it is
+  const ResponseModel model(record);
+  Eigen::MatrixXd u;  // no measured one enters
+  if (!model.simulate(arm, model.longest_step_s(arm), u)) return;
+  record.u_rad = u;
   const ParameterSet set(arm, experiment.actuation.kind, lengths);
   const Refinement it = predict(set, record, set.of(arm));
   fmt::print("{}: to {:.4g} mm rms a segment, of a motion of {:.4g} mm\n", what, 1e3 * it.rms_rad,
@@ -93,6 +97,7 @@ int choose_terms(const Experiment& experiment, IdentifyCommand& command,
       FitChoice lengths;
       lengths.elongation = true;
       options.identify.refinement.prior = std::max(1.0, options.identify.refinement.prior);
+      bend_as_predicted(*bend, folds);
       stretch = select_terms(start, experiment.actuation.kind, lengths, records, folds, options);
       bend->arm.elongation = stretch->arm.elongation;
     }

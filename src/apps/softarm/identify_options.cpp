@@ -72,6 +72,8 @@ void add_choice_options(CLI::App& command, IdentifyCommand& options) {
   command.add_flag("--saturation", options.choice.saturation,
                    "fit how every chamber's push bends off with pressure");
   command.add_flag("--remanence", options.choice.remanence, "fit a rest that follows the bend");
+  command.add_flag("--second-remanence", options.choice.second_remanence,
+                   "fit another one that follows faster");
   command.add_flag("--stiffening", options.choice.stiffening, "fit a stiffness that pressures add");
   command.add_flag("--cross", options.choice.cross, "fit forces of chambers on other segments");
   command.add_flag("--mass", options.choice.mass, "fit one factor on all masses");

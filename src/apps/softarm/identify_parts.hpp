@@ -32,8 +32,8 @@ void write_findings(const Experiment& experiment, const IdentifyCommand& command
 
 /// Prints how well an arm that stretches predicts the lengths of its segments; nothing of one that
 /// does not, or where they were not recorded.
-void print_lengths(const ArmHypothesis& arm, const Experiment& experiment,
-                   const MotionRecord& record, const std::string& what);
+void print_lengths(const ArmHypothesis& arm, const Experiment& experiment, MotionRecord record,
+                   const std::string& what);
 /// Prints how well an arm predicts the logs that were held out.
 void print_held_out(const ArmHypothesis& arm, const Experiment& experiment,
                     const std::vector<MotionRecord>& held_out, const IdentifyCommand& command);

@@ -172,6 +172,9 @@ std::string memory_yaml(const ArmHypothesis& arm, bool directions) {
     text += row("remanence", arm.remanence.share) + row("remanence_s", arm.remanence.time_s);
     text += pairs("remanent_u_rad", arm.remanent_rad);
   }
+  if (arm.remanence_2.share != 0.0)
+    text +=
+        row("remanence_2", arm.remanence_2.share) + row("remanence_2_s", arm.remanence_2.time_s);
   const ElongationHypothesis& it = arm.elongation;
   if (!it.given()) return text;
   text += row("stretch_m_per_bar", it.gain_m_per_bar.reshaped());
@@ -183,6 +186,11 @@ std::string memory_yaml(const ArmHypothesis& arm, bool directions) {
   if (it.remanence.share != 0.0)
     text += row("stretch_remanence", it.remanence.share) +
             row("stretch_remanence_s", it.remanence.time_s);
+  if (it.remanence_2.share != 0.0)
+    text += row("stretch_remanence_2", it.remanence_2.share) +
+            row("stretch_remanence_2_s", it.remanence_2.time_s);
+  text += row("stretch_set", it.set);
+  text += row("stretch_by_bend_m_per_rad2", it.by_bend_m_per_rad2);
   return text;
 }
 

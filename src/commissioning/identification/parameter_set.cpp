@@ -19,8 +19,10 @@ constexpr double kLongest_s = 10.0;             ///< lag of a chamber
 constexpr double kSaturation_1pbar = 0.5, kMostSaturation_1pbar = 2.0, kStiffening_1pbar = 0.5;
 constexpr double kSlip = 0.1, kSlipScale = 0.3;         ///< of k, a slip spring
 constexpr double kRemanent = 0.2, kRemanence_s = 20.0;  ///< share and time
+constexpr double kSecondRemanence_s = 5.0, kSoonest_s = 0.3, kLatest_s = 30.0;
 constexpr double kRemanentScale_rad = 0.05, kCross = 0.15;
 constexpr double kStretch_mpbar = 0.02, kOffsetScale_m = 0.02, kFrictionScale_m = 2e-3;
+constexpr double kSet = 0.2, kByBend_m_per_rad2 = 0.02;
 constexpr double kLeastLoad_kg = 1e-3;  ///< scale of a load
 constexpr double kCoarse = 1e-3;        ///< difference for what makes kinks
 
@@ -275,6 +277,19 @@ void ParameterSet::add_memory(const FitChoice& choice) {
           },
           kUnbounded, inf, none);
   }
+  if (choice.second_remanence) {
+    number(
+        "second remanence", "1", kRemanent,
+        [](const ArmHypothesis& arm) { return arm.remanence_2.share; },
+        [](ArmHypothesis& arm, double value) { arm.remanence_2.share = value; }, 0.0, 0.9,
+        start_.remanence_2.share > 0.0 ? none : 0.25 * kRemanent);
+    if (start_.remanence_2.share == 0.0) start_.remanence_2.time_s = kSecondRemanence_s;
+    number(
+        "its time", "s", kSecondRemanence_s,
+        [](const ArmHypothesis& arm) { return arm.remanence_2.time_s; },
+        [](ArmHypothesis& arm, double value) { arm.remanence_2.time_s = value; }, kSoonest_s,
+        kLatest_s, none);
+  }
   if (choice.cross && start_.arm.size() > 1) {
     const Eigen::Index dof = start_.arm.dof();
     if (start_.cross_nm_per_bar.size() == 0) start_.cross_nm_per_bar.setZero(dof, inputs);
@@ -406,6 +421,24 @@ void ParameterSet::add_elongation(const FitChoice& choice) {
         "its time", "s", kRemanence_s, [](auto& e) -> auto& { return e.remanence.time_s; }, 1.0,
         300.0, none);
   }
+  if (choice.set)
+    number(
+        "set of stretch", "1", kSet, [](auto& e) -> auto& { return e.set; }, 0.0, inf,
+        it.set > 0.0 ? none : 0.25 * kSet);
+  if (choice.by_bend)
+    number(
+        "length by bend", "m/rad^2", kByBend_m_per_rad2,
+        [](auto& e) -> auto& { return e.by_bend_m_per_rad2; }, kUnbounded, inf, none);
+  if (choice.second_remanence) {
+    number(
+        "second remanence of stretch", "1", kRemanent,
+        [](auto& e) -> auto& { return e.remanence_2.share; }, 0.0, inf,
+        it.remanence_2.share > 0.0 ? none : 0.25 * kRemanent);
+    if (it.remanence_2.share == 0.0) it.remanence_2.time_s = kSecondRemanence_s;
+    number(
+        "its time", "s", kSecondRemanence_s, [](auto& e) -> auto& { return e.remanence_2.time_s; },
+        kSoonest_s, kLatest_s, none);
+  }
 }
 
 Eigen::VectorXd ParameterSet::expected() const {
@@ -446,7 +479,8 @@ bool ParameterSet::possible(const Eigen::VectorXd& x) const {
       tried.arm.segments.begin(), tried.arm.segments.end(), [](const SegmentParameters& segment) {
         return segment.stiffness_nm_per_rad > 0.0 && segment.damping_nms_per_rad >= 0.0;
       });
-  return springs && tried.lag_s >= 0.0;
+  // Both rests together follow the bend by less than all of it: there is stiffness left in the end.
+  return springs && tried.lag_s >= 0.0 && tried.remanence.share + tried.remanence_2.share < 0.95;
 }
 
 bool ParameterSet::linear(Eigen::Index i) const { return (*this)[i].linear; }

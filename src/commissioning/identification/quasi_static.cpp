@@ -24,6 +24,25 @@ constexpr double kWeights[3][3] = {{kGamma, 0.0, 0.0},
 
 const double QuasiStaticMotion::kNodes[kStages] = {kGamma, 0.5 * (1.0 + kGamma), 1.0};
 
+void RemanentRest::begin(const ArmHypothesis& arm, Eigen::VectorXd& rest) {
+  slow_.setZero(arm.arm.dof());
+  second_.setZero(arm.arm.dof());
+  if (arm.remanent_rad.size() == slow_.size() && arm.remanence.share != 0.0)
+    slow_ = arm.remanent_rad;
+  rest = arm.rest_rad + slow_;
+}
+
+void RemanentRest::step(const ArmHypothesis& arm, const Eigen::VectorXd& u, double step_s,
+                        Eigen::VectorXd& rest) {
+  if (arm.remanence.share == 0.0 && arm.remanence_2.share == 0.0) return;
+  for (Eigen::Index c = 0; c < u.size(); ++c) {
+    const double bend = u[c] - arm.rest_rad[c];
+    if (arm.remanence.share != 0.0) slow_[c] = arm.remanence.step(slow_[c], bend, step_s);
+    if (arm.remanence_2.share != 0.0) second_[c] = arm.remanence_2.step(second_[c], bend, step_s);
+  }
+  rest = arm.rest_rad + slow_ + second_;
+}
+
 QuasiStaticMotion::QuasiStaticMotion(const ArmHypothesis& arm)
     : arm_(arm), plain_(arm.arm), workspace_(arm.arm) {
   const Eigen::Index dof = arm.arm.dof();
@@ -36,12 +55,10 @@ QuasiStaticMotion::QuasiStaticMotion(const ArmHypothesis& arm)
   }
   gravity_slope_.setZero(dof, dof);
   if (heavy_) gravity_slope_ = gravity_slope(plain_, Eigen::VectorXd::Zero(dof));
-  remanent_.setZero(dof);
-  if (arm.remanent_rad.size() == dof && arm.remanence.share != 0.0) remanent_ = arm.remanent_rad;
   for (Eigen::VectorXd* each : {&stiffness_, &force_, &u_, &left_, &change_, &base_, &stage_})
     each->setZero(dof);
   for (Eigen::VectorXd& each : rates_) each.setZero(dof);
-  rest_ = arm.rest_rad + remanent_;
+  remanents_.begin(arm, rest_);
   slope_.setZero(dof, dof);
 }
 
@@ -155,10 +172,7 @@ void QuasiStaticMotion::remember(double step_s) {
     for (Eigen::Index i = 0; i < u_.size(); i += 2)
       centres_[k].segment<2>(i) =
           play(centres_[k].segment<2>(i), u_.segment<2>(i), arm_.slip_springs[k].radius_rad);
-  if (arm_.remanence.share == 0.0) return;
-  for (Eigen::Index c = 0; c < u_.size(); ++c)
-    remanent_[c] = arm_.remanence.step(remanent_[c], u_[c] - arm_.rest_rad[c], step_s);
-  rest_ = arm_.rest_rad + remanent_;
+  remanents_.step(arm_, u_, step_s, rest_);
 }
 
 }  // namespace softarm

@@ -11,6 +11,19 @@
 
 namespace softarm {
 
+/// Where the springs rest, as the remanence of an arm moves it.
+class RemanentRest {
+ public:
+  /// @param rest  becomes that of the arm with what is remanent, 2n
+  void begin(const ArmHypothesis& arm, Eigen::VectorXd& rest);
+  /// The same after `step_s` at the bend u.
+  void step(const ArmHypothesis& arm, const Eigen::VectorXd& u, double step_s,
+            Eigen::VectorXd& rest);
+
+ private:
+  Eigen::VectorXd slow_, second_;  // 2n
+};
+
 /// D u' = input - springs - slip springs - G(u), by the third-order stiffly accurate SDIRK method
 /// (Alexander 1977, L-stable): stable for any step and any damping, D = 0 included, where every step
 /// ends in balance. What remembers is advanced at the end of a step.
@@ -45,7 +58,7 @@ class QuasiStaticMotion {
   Eigen::MatrixXd gravity_slope_;
   Eigen::VectorXd damping_, stiffness_;   ///< of every coordinate; stiffness as pressures make it
   Eigen::VectorXd input_, force_, rest_;  ///< of the stage; rest with what is remanent
-  Eigen::VectorXd remanent_;              ///< 2n
+  RemanentRest remanents_;
   std::vector<Eigen::VectorXd> centres_;  ///< 2n, of every slip spring
   Eigen::VectorXd u_, left_, change_, base_, rates_[kStages], stage_;
   Eigen::MatrixXd slope_;

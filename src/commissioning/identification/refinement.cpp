@@ -70,7 +70,7 @@ class Comparison {
     Eigen::Index to = 0;
     for (std::size_t r = 0; r < models_.size(); ++r) {
       if (set_.of_elongation()) {
-        models_[r].simulate_lengths(arm, all);
+        models_[r].simulate_lengths(arm, records_[r].u_rad, all);
       } else if (!models_[r].simulate(arm, step_s, all)) {
         return false;
       }

@@ -50,9 +50,7 @@ class Motion {
         spring_(arm.arm.dof()) {
     // The springs are added here, with their rest and their cubic part.
     for (SegmentParameters& segment : plain_.segments) segment.stiffness_nm_per_rad = 0.0;
-    remanent_.setZero(arm.arm.dof());
-    if (arm.remanent_rad.size() == remanent_.size()) remanent_ = arm.remanent_rad;
-    rest_ = arm.rest_rad + remanent_;
+    remanents_.begin(arm, rest_);
   }
 
   [[nodiscard]] bool acceleration(const Eigen::VectorXd& u, const Eigen::VectorXd& v,
@@ -150,16 +148,14 @@ class Motion {
       for (Eigen::Index i = 0; i < u.size(); i += 2)
         centres_[k].segment<2>(i) =
             play(centres_[k].segment<2>(i), u.segment<2>(i), arm_.slip_springs[k].radius_rad);
-    if (arm_.remanence.share == 0.0) return;
-    for (Eigen::Index c = 0; c < u.size(); ++c)
-      remanent_[c] = arm_.remanence.step(remanent_[c], u[c] - arm_.rest_rad[c], step_s);
-    rest_ = arm_.rest_rad + remanent_;
+    remanents_.step(arm_, u, step_s, rest_);
   }
 
   const ArmHypothesis& arm_;
   ArmParameters plain_;
   DynamicsWorkspace workspace_;
-  Eigen::VectorXd force_, spring_, rest_, remanent_;
+  Eigen::VectorXd force_, spring_, rest_;
+  RemanentRest remanents_;
   std::vector<Eigen::VectorXd> centres_;  ///< of the slip springs
   Eigen::VectorXd a1_, a2_, a3_, a4_, u2_, u3_, u4_, v2_, v3_, v4_;
 };
@@ -195,6 +191,7 @@ void with_memory(const IdentificationSettings& extra, ArmHypothesis& out) {
     if (k < extra.slip_stiffness_nm_per_rad.size() && extra.slip_stiffness_nm_per_rad[k] > 0.0)
       out.slip_springs.push_back({extra.slip_radius_rad[k], extra.slip_stiffness_nm_per_rad[k]});
   out.remanence = {extra.remanence, extra.remanence_s};
+  out.remanence_2 = {extra.remanence_2, extra.remanence_2_s};
   if (any(extra.remanent_u_rad)) out.remanent_rad = vector(extra.remanent_u_rad);
 }
 
@@ -208,6 +205,9 @@ void with_stretch(const IdentificationSettings& extra, ArmHypothesis& out) {
     it.saturation_1pbar = vector(extra.stretch_saturation_1pbar);
   it.friction_m = extra.stretch_friction_m;
   it.remanence = {extra.stretch_remanence, extra.stretch_remanence_s};
+  it.remanence_2 = {extra.stretch_remanence_2, extra.stretch_remanence_2_s};
+  it.set = extra.stretch_set;
+  it.by_bend_m_per_rad2 = extra.stretch_by_bend_m_per_rad2;
 }
 
 }  // namespace
@@ -373,25 +373,34 @@ bool ResponseModel::simulate_balance(const ArmHypothesis& arm, double longest_st
   return true;
 }
 
-void ResponseModel::simulate_lengths(const ArmHypothesis& arm, Eigen::MatrixXd& length_m) const {
+void ResponseModel::simulate_lengths(const ArmHypothesis& arm, const Eigen::MatrixXd& u_rad,
+                                     Eigen::MatrixXd& length_m) const {
   const ElongationHypothesis& it = arm.elongation;
   const Eigen::Index frames = record_.time_s.size(), n = it.offset_m.size();
   length_m.resize(frames, n);
   LaggedInput input(record_.input, it.lags, arm.dead_time_s);
-  Eigen::VectorXd p(it.gain_m_per_bar.cols()), centre, remanent = Eigen::VectorXd::Zero(n);
+  Eigen::VectorXd p(it.gain_m_per_bar.cols()), centre, most;
+  Eigen::VectorXd remanent = Eigen::VectorXd::Zero(n), remanent_2 = remanent;
   for (Eigen::Index k = 0; k < frames; ++k) {
     input.at(record_.time_s[k], p);
     for (Eigen::Index j = 0; j < it.saturation_1pbar.size(); ++j)
       p[j] *= 1.0 + it.saturation_1pbar[j] * p[j];
     const Eigen::VectorXd target = it.gain_m_per_bar * p;
-    if (k == 0) centre = target;
+    if (k == 0) centre = most = target;
     for (Eigen::Index i = 0; i < n; ++i) {
       centre[i] = std::clamp(centre[i], target[i] - it.friction_m, target[i] + it.friction_m);
-      if (k > 0 && it.remanence.share != 0.0)
-        remanent[i] =
-            it.remanence.step(remanent[i], centre[i], record_.time_s[k] - record_.time_s[k - 1]);
+      most[i] = std::max(most[i], centre[i]);
+      if (k == 0) continue;
+      const double passed_s = record_.time_s[k] - record_.time_s[k - 1];
+      if (it.remanence.share != 0.0)
+        remanent[i] = it.remanence.step(remanent[i], centre[i], passed_s);
+      if (it.remanence_2.share != 0.0)
+        remanent_2[i] = it.remanence_2.step(remanent_2[i], centre[i], passed_s);
     }
-    length_m.row(k) = it.offset_m + centre + remanent;
+    length_m.row(k) = it.offset_m + centre + remanent + remanent_2 + it.set * most;
+    if (it.by_bend_m_per_rad2 == 0.0) continue;
+    for (Eigen::Index i = 0; i < n; ++i)
+      length_m(k, i) += it.by_bend_m_per_rad2 * u_rad.row(k).segment<2>(2 * i).squaredNorm();
   }
 }
 

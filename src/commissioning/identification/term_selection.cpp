@@ -26,12 +26,16 @@ constexpr Term kOfBend[] = {
     {"lags of every chamber", &FitChoice::chamber_lags},
     {"masses", &FitChoice::mass},
     {"remanence", &FitChoice::remanence},
+    {"second remanence", &FitChoice::second_remanence},
     {"delay", &FitChoice::delay},
     {"stiffening", &FitChoice::stiffening},
     {"cubic stiffness", &FitChoice::cubic},
 };
 constexpr Term kOfElongation[] = {
+    {"set", &FitChoice::set},
+    {"bend", &FitChoice::by_bend},
     {"remanence", &FitChoice::remanence},
+    {"second remanence", &FitChoice::second_remanence},
     {"saturation", &FitChoice::one_saturation},
     {"saturation of every chamber", &FitChoice::saturation},
     {"friction", &FitChoice::hysteresis},
@@ -40,6 +44,7 @@ constexpr Term kOfElongation[] = {
 };
 constexpr double kPriors[] = {2.0, 0.5, 0.25};  ///< tried at the end, times that given
 constexpr double kLeastGain = 0.05;             ///< of a search, in squared standard errors
+constexpr int kRevisions = 2;                   ///< rounds over all terms after the first
 constexpr double kRadii[] = {0.3, 1.0, 2.5};    ///< of slip springs, of the motion's RMS
 
 /// RMS of a component of the motion about its mean.
@@ -67,7 +72,7 @@ class Selection {
 
   SelectedModel run(const FitChoice& plain) {
     SelectedModel out;
-    out.choice = plain;
+    out.choice = given_ = plain;
     out.prior = options_.identify.refinement.prior;
     Attempt best = attempt("plain", out.choice, out.prior, nullptr);
     best.trial.kept = true;
@@ -88,6 +93,7 @@ class Selection {
     } else {
       for (const Term& term : kOfBend)
         if (applies(term, out.choice)) consider(term.name, with(out.choice, term), out.prior);
+      revise(out, best);
     }
     const double given = out.prior;
     if (given > 0.0)
@@ -101,16 +107,62 @@ class Selection {
     return out;
   }
 
+  /// What was chosen, identified from other frames of the same records.
+  void identify_again(std::span<const MotionRecord> records, const std::vector<Fold>& folds,
+                      SelectedModel& out) const {
+    const ParameterSet set(start_, kind_, out.choice);
+    for (std::size_t i = 0; i < folds.size(); ++i)
+      out.by_fold[i] = set.arm(find(set, folds[i].seen, out.prior, {out.by_fold[i]}).x);
+    out.whole = find(set, records, out.prior, {out.arm});
+    out.arm = set.arm(out.whole.x);
+  }
+
  private:
   bool applies(const Term& term, const FitChoice& choice) const {
     if (choice.*term.flag) return false;
+    if (term.flag == &FitChoice::venting) return !choice.chamber_lags;
     if (term.flag == &FitChoice::one_saturation) return !choice.saturation;
+    if (term.flag == &FitChoice::second_remanence) return choice.remanence;
     return term.flag != &FitChoice::cross || start_.arm.size() > 1;
   }
 
   static FitChoice with(FitChoice choice, const Term& term) {
     choice.*term.flag = true;
     return choice;
+  }
+  static FitChoice without(FitChoice choice, const Term& term) {
+    choice.*term.flag = false;
+    return choice;
+  }
+
+  /// Whether the model would be another without a term that it has.
+  static bool counts(const Term& term, const FitChoice& choice) {
+    if (term.flag == &FitChoice::one_saturation) return !choice.saturation;
+    if (term.flag == &FitChoice::venting) return !choice.chamber_lags;
+    return term.flag != &FitChoice::remanence || !choice.second_remanence;
+  }
+
+  /// What a term is worth depends on those that came later: goes round again, leaves out what no
+  /// longer helps and adds what now does, until a round has changed nothing.
+  void revise(SelectedModel& out, Attempt& best) {
+    int unchanged = 0;
+    for (int k = 0; k < kRevisions * static_cast<int>(std::size(kOfBend)); ++k) {
+      const Term& term = kOfBend[static_cast<std::size_t>(k) % std::size(kOfBend)];
+      if (++unchanged > static_cast<int>(std::size(kOfBend))) return;
+      const bool there = out.choice.*term.flag;
+      if (there ? !counts(term, out.choice) || given_.*term.flag : !applies(term, out.choice))
+        continue;
+      const FitChoice choice = there ? without(out.choice, term) : with(out.choice, term);
+      Attempt tried =
+          attempt((there ? "without " : "") + std::string(term.name), choice, out.prior, &best);
+      const double most = (there ? 1.0 : 1.0 - options_.least_gain) * best.trial.unseen;
+      tried.trial.kept = tried.trial.unseen <= most;
+      out.trials.push_back(tried.trial);
+      if (!tried.trial.kept) continue;
+      out.choice = choice;
+      best = std::move(tried);
+      unchanged = 0;
+    }
   }
 
   /// Again and again the best of the terms of the elongation that are left, as long as it gains.
@@ -184,6 +236,7 @@ class Selection {
   }
 
   ArmHypothesis start_;
+  FitChoice given_;  ///< asked for: stays
   ActuationKind kind_;
   std::span<const MotionRecord> records_;
   const std::vector<Fold>& folds_;
@@ -213,6 +266,16 @@ std::vector<Fold> folds_of(std::span<const MotionRecord> records) {
   return out;
 }
 
+void bend_as_predicted(const SelectedModel& bend, std::vector<Fold>& folds) {
+  for (std::size_t i = 0; i < folds.size(); ++i) {
+    const ResponseModel model(folds[i].unseen);
+    Eigen::MatrixXd u;
+    const ArmHypothesis& arm = bend.by_fold[i];
+    if (!model.simulate(arm, model.longest_step_s(arm), u)) u.setZero();
+    folds[i].unseen.u_rad = u;
+  }
+}
+
 SelectedModel select_terms(const ArmHypothesis& start, ActuationKind kind, const FitChoice& plain,
                            std::span<const MotionRecord> records, const std::vector<Fold>& folds,
                            const SelectionOptions& options) {
@@ -230,7 +293,10 @@ SelectedModel select_terms(const ArmHypothesis& start, ActuationKind kind, const
     few_folds.push_back({{}, thinned(fold.unseen)});
     for (const MotionRecord& each : fold.seen) few_folds.back().seen.push_back(thinned(each));
   }
-  return Selection(start, kind, few, few_folds, options).run(plain);
+  Selection selection(start, kind, few, few_folds, options);
+  SelectedModel out = selection.run(plain);
+  selection.identify_again(records, folds, out);
+  return out;
 }
 
 std::string selection_text(const SelectedModel& model, double motion, double unit,

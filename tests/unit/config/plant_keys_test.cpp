@@ -123,9 +123,12 @@ TEST(PlantKeys, SegmentsThatStretch) {
   refuses("plant: {arm: {extensible: [1, 0]}}\n", 7, "plant.arm.extensible");
   refuses("plant: {arm: {extensible: [1, 0, 2]}}\n", 7, "plant.arm.extensible");
   refuses("plant: {kind: links, arm: {extensible: true}}\n", 7, "for kind links");
-  for (const char* term : {"cubic_per_rad2", "stiffening_per_bar", "remanence", "bouc_wen"})
+  for (const char* term :
+       {"cubic_per_rad2", "stiffening_per_bar", "remanence", "remanence_2", "bouc_wen"})
     refuses(std::string("plant: {kind: links, material: {") + term + ": 0.1}}\n", 7,
             "plant.material: expected a kind of plant that has these terms");
+  refuses("plant: {material: {axial_remanence_2: 0.1}}\n", 7,
+          "plant.material.axial_remanence_2: expected 0 where plant.arm.extensible is false");
   refuses("plant: {valves: {supply_sag_s: 0.1, lag_s: 0}}\n", 7,
           "plant.valves.supply_sag_s: expected 0 s where");
   refuses("plant: {arm: {extensible: true, actuation_model: couple}}\n", 7,

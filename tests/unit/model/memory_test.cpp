@@ -73,5 +73,28 @@ TEST(Remanence, TwoHalfStepsAreOne) {
   EXPECT_NEAR(element.step(0.0, 1.0, 7.0), 0.3 * (1.0 - std::exp(-1.0)), 1e-15);
 }
 
+/// The moment of two elements over a cycle of A sin w t: pi A^2 sum m_i w T_i / (1 + (w T_i)^2).
+TEST(Remanence, TwoElementsDissipateTheirCycles) {
+  const double parts[] = {0.3, 0.2}, amplitude = 0.4, w = 2.0 * M_PI / 10.0;
+  const Remanence elements[] = {{1.0, 20.0}, {1.0, 1.5}};
+  double z[] = {0.0, 0.0}, u = 0.0, work = 0.0, expected = 0.0;
+  constexpr int kSteps = 4000, kCycles = 20;  // a cycle; what was before the last has gone
+  for (int k = 1; k <= kCycles * kSteps; ++k) {
+    const double next = amplitude * std::sin(2.0 * M_PI * k / kSteps), middle = 0.5 * (u + next);
+    for (int i = 0; i < 2; ++i) {
+      const double after = elements[i].step(z[i], middle, 10.0 / kSteps);
+      if (k > (kCycles - 1) * kSteps)
+        work += parts[i] * (middle - 0.5 * (z[i] + after)) * (next - u);
+      z[i] = after;
+    }
+    u = next;
+  }
+  for (int i = 0; i < 2; ++i) {
+    const double x = w * elements[i].time_s;
+    expected += M_PI * amplitude * amplitude * parts[i] * x / (1.0 + x * x);
+  }
+  EXPECT_NEAR(work, expected, 1e-3 * expected);
+}
+
 }  // namespace
 }  // namespace softarm

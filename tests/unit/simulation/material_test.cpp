@@ -1,12 +1,14 @@
 // What MaterialSettings add to K u, against closed forms of one segment without weight.
 #include <gtest/gtest.h>
 
+#include <Eigen/Eigenvalues>
 #include <cmath>
 #include <random>
 #include <stdexcept>
 #include <vector>
 
 #include "softarm/actuation/chamber_hysteresis.hpp"
+#include "softarm/model/dynamics.hpp"
 #include "softarm/model/memory.hpp"
 #include "softarm/simulation/arm_plant.hpp"
 #include "unit/simulation/paper_arm.hpp"
@@ -76,6 +78,57 @@ TEST(Material, AnArmThatWasHeldBentComesBackBent) {
     EXPECT_NEAR(later / left, std::exp(-2.0 * slow), 2e-4);
     left = later;
   }
+}
+
+/// The step response with two Maxwell elements against exp(A t) of (u, u', z_1, z_2).
+TEST(Material, TwoMaxwellElementsRelaxWithTwoTimes) {
+  PlantSettings settings =
+      weightless({.remanence = 0.3, .remanence_s = 4.0, .remanence_2 = 0.2, .remanence_2_s = 0.8});
+  ArmPlant plant(settings);
+  const double k = stiffness(settings), force = 0.5 * gain(settings);
+  const SegmentParameters& segment = settings.arm.segments[0];
+  DynamicsWorkspace workspace(settings.arm);
+  Eigen::MatrixXd inertia(2, 2);
+  inertia_matrix(settings.arm, workspace, Eigen::Vector2d::Zero(), inertia);
+  const double b = inertia(0, 0), m_1 = 0.3, m_2 = 0.2;  // at small bends
+  Eigen::Matrix4d rates;
+  rates << 0.0, 1.0, 0.0, 0.0,  //
+      -k * (1.0 + m_1 + m_2) / b, -segment.damping_nms_per_rad / b, k * m_1 / b, k * m_2 / b,
+      1.0 / 4.0, 0.0, -1.0 / 4.0, 0.0,  //
+      1.0 / 0.8, 0.0, 0.0, -1.0 / 0.8;
+  const Eigen::Vector4d settled = force / k * Eigen::Vector4d(1.0, 0.0, 1.0, 1.0);
+  const Eigen::EigenSolver<Eigen::Matrix4d> modes(rates);
+  const Eigen::Vector4cd amount = modes.eigenvectors().inverse() * (-settled);
+  double bend = 0.0;
+  for (const double t : {0.4, 1.0, 2.0, 4.0, 8.0, 20.0}) {
+    bend = bend_after(plant, 0.5, t - plant.time_s());
+    const Eigen::Vector4cd grown = (modes.eigenvalues() * t).array().exp() * amount.array();
+    const double expected = (settled + (modes.eigenvectors() * grown).real())[0];
+    EXPECT_NEAR(bend, expected, 1e-3 * settled[0]) << t;
+  }
+  // Before anything relaxes the arm is stiffer by both, in the end by none.
+  EXPECT_NEAR(bend, settled[0], 0.02 * settled[0]);
+}
+
+/// Pushed along its axis, an arm that stretches comes to e = F / K_a in the end, from 1 / (1 + m_1 +
+/// m_2) of that; its bend, which has no such element, does at once.
+TEST(Material, LengthRelaxesWhereTheArmStretches) {
+  PlantSettings settings = stretching(weightless({.remanence_s = 3.0,
+                                                  .remanence_2_s = 0.6,
+                                                  .axial_remanence = 0.4,
+                                                  .axial_remanence_2 = 0.3}));
+  const auto lengthened = [](const PlantSettings& of, double seconds) {
+    ArmPlant plant(of);
+    plant.command(std::vector<double>{0.5, 0.5, 0.5, 0.5});
+    for (int i = 1; i <= 200; ++i) plant.advance(seconds * i / 200);
+    return plant.elongation_m()[0];
+  };
+  PlantSettings elastic = settings;
+  elastic.material = {};
+  const double in_the_end = lengthened(elastic, 40.0);
+  ASSERT_GT(std::abs(in_the_end), 1e-4);
+  EXPECT_NEAR(lengthened(settings, 40.0), in_the_end, 1e-3 * std::abs(in_the_end));
+  EXPECT_NEAR(lengthened(settings, 0.3) / in_the_end, 1.0 / 1.7, 0.1);
 }
 
 /// Slow loading and unloading against the integrals of dz/du = 1 -+ ... for exponent 1: loading,
@@ -161,6 +214,8 @@ TEST(Material, EnergyBalances) {
                        .stiffening_per_bar = 0.1,
                        .remanence = 0.2,
                        .remanence_s = 2.0,
+                       .remanence_2 = 0.1,
+                       .remanence_2_s = 0.3,
                        .bouc_wen = 0.3};
   settings.valves.lag_s = 0.05;
   settings.valves.vent_lag_s = 0.2;

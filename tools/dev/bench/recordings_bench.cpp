@@ -194,7 +194,8 @@ class Arena {
 
   /// Terms chosen by what was not seen.
   void choose(const Loaded& loaded, const std::vector<Loaded>& others) {
-    const std::vector<Fold> folds = halves(loaded.record);
+    std::vector<Fold> folds = halves(loaded.record);
+    const std::vector<Fold> judged = folds;
     const std::span<const MotionRecord> all(&loaded.record, 1);
     SelectionOptions options;
     const ActuationKind kind = loaded.experiment.actuation.kind;
@@ -210,6 +211,7 @@ class Arena {
     FitChoice length;
     length.elongation = true;
     const SelectedModel bend = select("bend", plain_choice());
+    bend_as_predicted(bend, folds);
     const SelectedModel stretch = select("elongation", length);
     Found whole{"chosen",       bend.trials.front().parameters,
                 since(begin),   bend.whole.converged,
@@ -224,7 +226,7 @@ class Arena {
       part.chords = fit_chords(folds[i].seen);
       parts.push_back(part);
     }
-    report(loaded, others, whole, parts, folds);
+    report(loaded, others, whole, parts, judged);
     report_.choices.push_back({name, bend, stretch});
   }
 
@@ -254,7 +256,7 @@ class Arena {
     }
     for (Eigen::Index i = 0; i < length.cols(); ++i)
       length.col(i).setConstant(of.experiment.arm.segments[static_cast<std::size_t>(i)].length_m);
-    if (found.stretch) model.simulate_lengths(*found.stretch, length);
+    if (found.stretch) model.simulate_lengths(*found.stretch, u, length);
     const Eigen::MatrixXd bend = found.chords ? found.chords->bend_rad(u) : u;
     const Eigen::MatrixX3d tip = tips_m(u, chords_m(bend, length));
     const Eigen::Index frames =

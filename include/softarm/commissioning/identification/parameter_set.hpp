@@ -40,8 +40,9 @@ struct FitChoice {
   bool one_saturation = false;  ///< p counts as p (1 + q p), the same q in all chambers
   bool saturation = false;      ///< the same with a q of every chamber
   bool hysteresis = false;      ///< slip springs, at radii taken from the motion
-  bool remanence = false;   ///< the rest creeps after use: share, time, and where it is at first
-  bool stiffening = false;  ///< k (1 + s sum p)
+  bool remanence = false;  ///< the rest creeps after use: share, time, and where it is at first
+  bool second_remanence = false;  ///< another one that is faster, from rest at first
+  bool stiffening = false;        ///< k (1 + s sum p)
   /// Chambers act on the segments nearer the base, too, which their tendons or tubes pass.
   bool cross = false;
   bool mass = false;    ///< one factor on all masses, against the configured ones
@@ -49,6 +50,8 @@ struct FitChoice {
   bool load = false;    ///< a point mass at the tip
   /// How the segments stretch, instead of how they bend: only the elongation is identified.
   bool elongation = false;
+  bool set = false;      ///< of the elongation: part of the largest stretch so far stays
+  bool by_bend = false;  ///< of the elongation: a bent segment has another length
 };
 
 /// One unknown. The search uses units of its scale.

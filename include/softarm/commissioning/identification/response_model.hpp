@@ -21,7 +21,10 @@ struct ElongationHypothesis {
   std::vector<FillVentLag> lags;     ///< of every input
   Eigen::VectorXd saturation_1pbar;  ///< of every input
   double friction_m = 0.0;           ///< half width of a play between pressure and length
-  Remanence remanence;               ///< of the length beyond the offset, share of it
+  Remanence remanence, remanence_2;  ///< of the length beyond the offset, share of it
+  /// Of the largest stretch by pressure so far, this part stays: the set that a fresh arm takes.
+  double set = 0.0;
+  double by_bend_m_per_rad2 = 0.0;  ///< what a bend adds, by |u|^2; negative: bent it is shorter
 
   bool given() const { return offset_m.size() > 0; }
 };
@@ -47,12 +50,15 @@ struct ArmHypothesis {
   std::vector<SlipSpring> slip_springs;  ///< hysteresis, alike in every segment
   Remanence remanence;                   ///< of the rest, alike in every segment
   Eigen::VectorXd remanent_rad;          ///< 2n: its state when the record begins
+  Remanence remanence_2;                 ///< the same with another time; 0 when the record begins
   ElongationHypothesis elongation;
 
   /// The lag of every input.
   std::vector<FillVentLag> input_lags() const;
   /// Whether the bend depends on what was before, beyond (16).
-  bool remembers() const { return !slip_springs.empty() || remanence.share != 0.0; }
+  bool remembers() const {
+    return !slip_springs.empty() || remanence.share != 0.0 || remanence_2.share != 0.0;
+  }
 };
 
 /// The arm as the controller of an experiment models it, with the terms of `identification`.
@@ -91,8 +97,10 @@ class ResponseModel {
   [[nodiscard]] bool simulate(const ArmHypothesis& arm, double longest_step_s,
                               Eigen::MatrixXd& u) const;
 
-  /// The length of every segment at every frame (n columns), m, by arm.elongation.
-  void simulate_lengths(const ArmHypothesis& arm, Eigen::MatrixXd& length_m) const;
+  /// The length of every segment at every frame (n columns), m, by arm.elongation. @param u_rad  of
+  /// every frame, 2n columns: as simulated, where lengths are predicted
+  void simulate_lengths(const ArmHypothesis& arm, const Eigen::MatrixXd& u_rad,
+                        Eigen::MatrixXd& length_m) const;
 
  private:
   double fastest_1ps(const ArmHypothesis& arm) const;

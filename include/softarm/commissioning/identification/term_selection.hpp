@@ -48,7 +48,7 @@ struct SelectionOptions {
   IdentifyOptions identify;
   double least_gain = 0.01;  ///< relative, of the error on what was not seen; less is no gain
   /// Without inertia, frames so far apart are searched with, and measured pressures are averaged over
-  /// half of it: a tenth of the shortest lag of such arms.
+  /// half of it: a tenth of the shortest lag of such arms. What was chosen is identified from all.
   double apart_s = 0.1;
   std::function<void(const std::string&)> progress;  ///< may be empty
 };
@@ -57,13 +57,18 @@ struct SelectionOptions {
 /// had on real arms: asymmetric lag, rest, cross-coupling, hysteresis, saturation, lags of every
 /// chamber, masses (gravity beside k), remanence, delay, stiffening, cubic stiffness. Of the
 /// elongation, which is quick, the best of all that are left each time. A term stays if the error on
-/// what was not seen becomes less by `least_gain`; then other widths of the prior are tried in the same
-/// way.
+/// what was not seen becomes less by `least_gain`. Then all terms of the bend are gone through again,
+/// twice at most: one that no longer helps goes, one that now does comes. At last other widths of the
+/// prior are tried in the same way.
 /// @param start  what is configured; every segment gets slip springs at radii taken from the motion
 /// @throws std::runtime_error as `identify`, of the plain model only
 SelectedModel select_terms(const ArmHypothesis& start, ActuationKind kind, const FitChoice& plain,
                            std::span<const MotionRecord> records, const std::vector<Fold>& folds,
                            const SelectionOptions& options);
+
+/// Gives the parts not seen the bend that `bend` predicts there, for a selection of the elongation:
+/// lengths may follow the bend, and no measured u may enter what is predicted.
+void bend_as_predicted(const SelectedModel& bend, std::vector<Fold>& folds);
 
 /// Every term with its price and its gain, for a person.
 std::string selection_text(const SelectedModel& model, double motion, double unit,

@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <Eigen/Eigenvalues>
+
 #include "softarm/commissioning/identification/fit_report.hpp"
 #include "softarm/commissioning/identification/term_selection.hpp"
 #include "softarm/commissioning/identification/tip_prediction.hpp"
@@ -72,6 +74,60 @@ TEST(QuasiStatic, RemanenceIsTheStandardLinearSolid) {
   const double at_once = 0.2 * arm.input_map.col(2).norm();
   EXPECT_NEAR(u.row(1).norm(), at_once, 0.02 * at_once);
   EXPECT_NEAR(u.bottomRows<1>().norm(), at_once / 0.7, 1e-3 * at_once);
+}
+
+TEST(QuasiStatic, TwoRemanencesCreepWithTheTimesOfTheirSystem) {
+  // Without damping u - rest = f / k + z_1 + z_2, T_i z_i' = s_i (u - rest) - z_i: a linear system of
+  // two rates; with and without inertia alike where the arm is light.
+  ArmHypothesis arm = configured(weightless());
+  arm.inertia = false;
+  arm.arm.segments[0].damping_nms_per_rad = 0.0;
+  arm.remanence = {0.3, 20.0};
+  arm.remanence_2 = {0.15, 2.0};
+  const MotionRecord record = pressed(60.0, [](double t) { return t > 0.01 ? 0.2 : 0.0; });
+  Eigen::MatrixXd u;
+  ASSERT_TRUE(ResponseModel(record).simulate(arm, 0.05, u));
+  const double at_once = 0.2 * arm.input_map.col(2).norm();
+  Eigen::Matrix2d rates;
+  rates << (0.3 - 1.0) / 20.0, 0.3 / 20.0, 0.15 / 2.0, (0.15 - 1.0) / 2.0;
+  const Eigen::Vector2d settled =
+      -rates.inverse() * Eigen::Vector2d(0.3 / 20.0, 0.15 / 2.0) * at_once;
+  const Eigen::EigenSolver<Eigen::Matrix2d> modes(rates);
+  const Eigen::Vector2cd amount = modes.eigenvectors().inverse() * (-settled);
+  for (const Eigen::Index frame : {20, 60, 200, 600, 1200}) {
+    const double t = record.time_s[frame] - 0.025;  // the pressure rises within the first frame
+    const Eigen::Vector2cd grown = (modes.eigenvalues() * t).array().exp() * amount.array();
+    const double expected = at_once + (settled + (modes.eigenvectors() * grown).real()).sum();
+    EXPECT_NEAR(u.row(frame).norm(), expected, 5e-3 * at_once) << t;
+  }
+  arm.inertia = true;
+  arm.arm.segments[0].damping_nms_per_rad = 0.05;
+  Eigen::MatrixXd moved;
+  ASSERT_TRUE(ResponseModel(record).simulate(arm, 0.005, moved));
+  EXPECT_LT((moved - u).bottomRows(1000).cwiseAbs().maxCoeff(), 0.01 * at_once);
+}
+
+TEST(Lengths, AFreshArmTakesASetAndABentOneIsShorter) {
+  // Pressed to 0.5 bar, vented, pressed again: the set of the first time stays, no second one comes.
+  ArmHypothesis arm = configured(weightless());
+  ElongationHypothesis& it = arm.elongation;
+  it.offset_m = Eigen::VectorXd::Constant(1, 0.1);
+  it.gain_m_per_bar = Eigen::MatrixXd::Constant(1, 4, 0.02);
+  it.lags.assign(4, FillVentLag{});
+  it.set = 0.25;
+  it.by_bend_m_per_rad2 = -0.04;
+  MotionRecord record =
+      pressed(9.0, [](double t) { return t < 1.0 || (t > 3.0 && t < 5.0) || t > 8.0 ? 0.0 : 0.5; });
+  record.u_rad(170, 0) = 0.3;
+  record.u_rad(170, 1) = -0.4;
+  Eigen::MatrixXd length;
+  ResponseModel(record).simulate_lengths(arm, record.u_rad, length);
+  const double stretch = 0.02 * 0.5;
+  EXPECT_NEAR(length(10, 0), 0.1, 1e-12);
+  EXPECT_NEAR(length(40, 0), 0.1 + 1.25 * stretch, 1e-12);
+  EXPECT_NEAR(length(80, 0), 0.1 + 0.25 * stretch, 1e-12);
+  EXPECT_NEAR(length(120, 0), 0.1 + 1.25 * stretch, 1e-12);
+  EXPECT_NEAR(length(170, 0), 0.1 + 0.25 * stretch - 0.04 * 0.25, 1e-12);
 }
 
 TEST(InputTrack, AveragesOfMeasurementsStayOnStraightLines) {
@@ -185,6 +241,7 @@ TEST(IdentifiedYaml, HoldsEveryTermAndLoadsAgain) {
   arm.cross_nm_per_bar = Eigen::MatrixXd::Random(4, 6);
   arm.slip_springs = {{0.01, 0.3}, {0.05, 0.2}};
   arm.remanence = {0.2, 17.0};
+  arm.remanence_2 = {0.1, 3.0};
   arm.remanent_rad = Eigen::Vector4d(0.01, -0.02, 0.03, 0.04);
   arm.load_kg = 0.05;
   ElongationHypothesis& stretch = arm.elongation;
@@ -194,6 +251,9 @@ TEST(IdentifiedYaml, HoldsEveryTermAndLoadsAgain) {
   stretch.saturation_1pbar = Eigen::VectorXd::LinSpaced(6, 0.1, 0.3);
   stretch.friction_m = 1e-3;
   stretch.remanence = {0.1, 40.0};
+  stretch.remanence_2 = {0.05, 4.0};
+  stretch.set = 0.15;
+  stretch.by_bend_m_per_rad2 = -0.02;
 
   const ArmHypothesis loaded = configured(found.written());
   EXPECT_EQ(loaded.inertia, arm.inertia);
@@ -211,6 +271,8 @@ TEST(IdentifiedYaml, HoldsEveryTermAndLoadsAgain) {
   EXPECT_NEAR(loaded.slip_springs[1].stiffness_nm_per_rad, 0.2, 1e-9);
   EXPECT_NEAR(loaded.remanence.share, 0.2, 1e-9);
   EXPECT_NEAR(loaded.remanence.time_s, 17.0, 1e-9);
+  EXPECT_NEAR(loaded.remanence_2.share, 0.1, 1e-9);
+  EXPECT_NEAR(loaded.remanence_2.time_s, 3.0, 1e-9);
   EXPECT_LT((loaded.remanent_rad - arm.remanent_rad).norm(), 1e-6);
   EXPECT_NEAR(loaded.load_kg, 0.05, 1e-9);
   EXPECT_LT((loaded.elongation.offset_m - stretch.offset_m).norm(), 1e-6);
@@ -219,6 +281,10 @@ TEST(IdentifiedYaml, HoldsEveryTermAndLoadsAgain) {
   EXPECT_LT((loaded.elongation.saturation_1pbar - stretch.saturation_1pbar).norm(), 1e-6);
   EXPECT_NEAR(loaded.elongation.friction_m, 1e-3, 1e-9);
   EXPECT_NEAR(loaded.elongation.remanence.time_s, 40.0, 1e-9);
+  EXPECT_NEAR(loaded.elongation.remanence_2.share, 0.05, 1e-9);
+  EXPECT_NEAR(loaded.elongation.remanence_2.time_s, 4.0, 1e-9);
+  EXPECT_NEAR(loaded.elongation.set, 0.15, 1e-9);
+  EXPECT_NEAR(loaded.elongation.by_bend_m_per_rad2, -0.02, 1e-9);
 }
 
 /// What was identified is what the tick inverts; what was not, and what was configured only, is not.
