@@ -17,6 +17,7 @@
 #include "softarm/control/control_laws.hpp"
 #include "softarm/control/reference.hpp"
 #include "softarm/control/reference_kinds.hpp"
+#include "softarm/control/repetition.hpp"
 #include "softarm/runtime/elongation_reference.hpp"
 #include "softarm/runtime/safety_monitor.hpp"
 #include "softarm/valves/register_map.hpp"
@@ -63,6 +64,7 @@ class Checks {
     });
     check_inverse();
     check_reference();
+    if (experiment_.control.repetition.lead_s > 0.0) check_repetition();
   }
 
  private:
@@ -264,6 +266,38 @@ class Checks {
           check_in_plane(fmt::format("{}.points[{}]", key, j), way->points[j].u_rad);
       }
     }
+  }
+
+  /// Something must find the disturbance, something cancel it, and the reference must repeat.
+  void check_repetition() const {
+    const char* key = "control.repetition.lead_s";
+    const char* period_key = "control.repetition.period_s";
+    const RepetitionSettings& it = experiment_.control.repetition;
+    const auto zero_unless = [&](bool holds, const char* what) {
+      require(holds, key, fmt::format("0 s without {}", what), fmt::format("{} s", it.lead_s));
+    };
+    zero_unless(experiment_.estimation.observer == ObserverKind::model,
+                "estimation.observer: model");
+    zero_unless(experiment_.control.disturbance == DisturbanceRejection::cancel,
+                "control.disturbance: cancel");
+    zero_unless(experiment_.control.law.get_if<ExternalLaw>() == nullptr,
+                "a control.law that cancels disturbances");
+    bool repeats = false;
+    for (const ReferencePhase& phase : experiment_.reference.phases) {
+      const double own_s = period_s(phase), used_s = it.period_s.value_or(own_s);
+      repeats |= used_s > 0.0;
+      if (!(used_s > 0.0)) continue;
+      require(own_s == 0.0 || whole_periods(used_s, own_s), period_key,
+              fmt::format("a whole number of periods of the reference ({:.6g} s)", own_s),
+              fmt::format("{:.6g} s", used_s));
+      below(key, it.lead_s, 0.5 * used_s, "half of the period");
+      const double shortest_s = RepetitiveCompensation::kNodes / experiment_.rate_hz;
+      at_least(it.period_s ? period_key : key, used_s, shortest_s,
+               "a tick for every part of the period that is learnt");
+    }
+    require(repeats, key,
+            "0 s where no phase of the reference repeats (or else its control.repetition.period_s)",
+            fmt::format("{} s", it.lead_s));
   }
 
   /// Of a planar arm.

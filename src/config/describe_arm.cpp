@@ -124,6 +124,11 @@ static void describe(Keys& key, ModelObserverSettings& it) {
   KEY(payload_deviation, from(0, 10),
       "standard deviation of a mass at the tip before anything was learnt, over the arm's mass: "
       "stiffness, damping and gain of all segments are then likely to be wrong together");
+  it.load.resize(static_cast<std::size_t>(2 * key.segments), 0.0);
+  KEY(load, from(-1, 1).one_or_pairs(),
+      "horizontal load of every segment before anything was learnt, over its weight: [x, y] across "
+      "gravity; --learned writes it");
+  KEY(load_deviation, from(0, 1), "its standard deviation; left out: parameter_deviation");
   KEY(parameter_drift_per_sqrt_s, from(0, 1), "random walk of the parameters, relative");
   KEY(disturbance_drift_per_sqrt_s, above(0, 10),
       "random walk of the disturbance over the torque that bends a segment by 1 rad, at least");
@@ -188,6 +193,14 @@ static void describe_law(Keys& key, LawKind& chosen) {
   }
 }
 
+static void describe(Keys& key, RepetitionSettings& it) {
+  KEY(lead_s, from(0, 1),
+      "what repeats is known so long before the observer has seen it: what it is late by, about "
+      "0.1 "
+      "s; 0: nothing is learnt, at no cost");
+  KEY(period_s, above(0, 1e4), "left out: that of the reference");
+}
+
 static void describe(Keys& key, ControllerSettings& it) {
   describe_law(key, it.law);
   const bool has_gains =
@@ -212,6 +225,10 @@ static void describe(Keys& key, ControllerSettings& it) {
   KEY(disturbance, one_of({"cancel", "model_only", "none"}),
       "what the model observer found: cancel (parameters and disturbance), model_only (parameters; "
       "the arm stays soft), none");
+  KEY(repetition,
+      "of the disturbance along a periodic reference, learnt by its phase and cancelled ahead; "
+      "with "
+      "estimation.observer: model and disturbance: cancel");
   KEY(valve_lag_s, from(0, 2), "first-order lag inverted on what depends on the reference alone");
   key("delay_s", it.dead_time_s, from(0, 0.5),
       "dead time of valves and tubes, for the check of gains at load time");

@@ -90,6 +90,10 @@ double PaperReference::largest_speed_radps() const noexcept {
   return std::hypot(rise, theta_rad * phi_amplitude_rad * rate_radps);
 }
 
+double PaperReference::period_s() const noexcept {
+  return rate_radps > 0.0 && phi_amplitude_rad > 0.0 ? 2.0 * pi / rate_radps : 0.0;
+}
+
 // (24) in polar coordinates, then u = theta n, u' = theta' n + theta phi' t,
 // u'' = (theta'' - theta phi'^2) n + (2 theta' phi' + theta phi'') t with n = (cos, sin) phi, t =
 // (-sin, cos) phi.
@@ -170,6 +174,10 @@ double WayPointReference::largest_speed_radps() const noexcept {
         speed, kQuinticPeakSpeed * largest_distance(a.u_rad, b.u_rad) / (b.time_s - a.time_s));
   }
   return speed;
+}
+
+double WayPointReference::period_s() const noexcept {
+  return repeat ? points.back().time_s - points.front().time_s : 0.0;
 }
 
 void WayPointReference::evaluate(double time_s, ReferenceSample& out) const noexcept {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 #include <optional>
 #include <stdexcept>
 
@@ -66,6 +67,19 @@ double largest_theta_rad(const ReferenceSettings& settings) noexcept {
     theta = std::max(theta, phase.kind.largest_theta_rad());
   }
   return theta;
+}
+
+bool whole_periods(double time_s, double period_s) noexcept {
+  constexpr double kRounding = 1e-6;
+  const double periods = time_s / period_s;
+  return periods > 0.5 && std::abs(periods - std::round(periods)) <= kRounding * periods;
+}
+
+double period_s(const ReferencePhase& phase) noexcept {
+  const ElongationPath& path = phase.elongation;
+  const double own_s = phase.kind.period_s();
+  if (path.amplitude_m == 0.0 || path.rate_radps == 0.0) return own_s;
+  return whole_periods(own_s, 2.0 * std::numbers::pi / std::abs(path.rate_radps)) ? own_s : 0.0;
 }
 
 struct Reference::State {
@@ -404,6 +418,13 @@ void Reference::sample(double time_s, ReferenceSample& out) const noexcept {
     out.has_polar = false;
   }
   if (s.norm(out.velocity) > s.control.max_speed_radps * (1.0 + 1e-9)) out.limited = true;
+}
+
+Reference::Place Reference::place(double time_s) const noexcept {
+  Place out{};
+  const double local_s = std::max(time_s - state_->start_s, 0.0);
+  out.since_s = local_s - state_->at(local_s, out.phase).begin_s;
+  return out;
 }
 
 void Reference::window(double time_s, double lookahead_s, ReferenceWindow& out) const noexcept {

@@ -35,6 +35,11 @@ void TipPathReference::check(const ReferencePlace& place, const ControllerSettin
                 "a path of finite numbers", "one that is not");
 }
 
+double TipPathReference::period_s() const noexcept {
+  return shape != TipPathShape::point && rate_radps > 0.0 ? 2.0 * std::numbers::pi / rate_radps
+                                                          : 0.0;
+}
+
 TipReference TipPathReference::tip(double time_s) const noexcept {
   TipReference out;
   out.position_m = centre_m;

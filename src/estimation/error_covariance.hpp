@@ -75,6 +75,11 @@ class ErrorCovariance {
     P_.diagonal().segment(dof_, dof_).setConstant(velocity);
     P_.diagonal().segment(2 * dof_, dof_) = disturbance;
   }
+  /// The horizontal loads, the last two parameters of every segment, are known so well.
+  void set_load_variance(double variance) noexcept {
+    for (int i = 0; i < dof_ / 2; ++i)
+      P_.diagonal().template segment<2>(parameters() + kParameters * i + 3).setConstant(variance);
+  }
   /// Adds a variance to every parameter that is known better than `prior_deviation`.
   void add_to_parameters(double variance, double prior_deviation) noexcept {
     const double prior = prior_deviation * prior_deviation;

@@ -117,7 +117,12 @@ ModelObserver::State::State(const ArmParameters& arm_, const EstimationSettings&
   require(settings.largest_disturbance_drift_per_sqrt_s >= settings.disturbance_drift_per_sqrt_s,
           "largest_disturbance_drift_per_sqrt_s not below the least",
           settings.largest_disturbance_drift_per_sqrt_s);
+  const double load_deviation = settings.load_deviation.value_or(0.0);
+  require(load_deviation >= 0.0, "load_deviation >= 0", load_deviation);
   const int n = arm.size();
+  if (!settings.load.empty() && settings.load.size() != static_cast<std::size_t>(2 * n))
+    throw std::invalid_argument(fmt::format("observer: expected a load of {} numbers, got {}",
+                                            2 * n, settings.load.size()));
   if (arm_.extensible) {
     whole = arm_;
     axial = std::make_unique<AxialObserver>(arm_, settings, history.size(), timing.valve_lag_s);
@@ -146,13 +151,18 @@ void ModelObserver::State::fail() noexcept {
 void ModelObserver::State::forget_parameters() noexcept {
   for (Parameters& shown : information) shown.setZero();
   correction.segment.fill({});
+  for (std::size_t i = 0; 2 * i + 1 < settings.load.size(); ++i)
+    correction.segment[i].load = {settings.load[2 * i], settings.load[2 * i + 1]};
   correction.disturbance_nm.setZero(arm.dof());
   if (axial) axial->forget_parameters();
-  const double sigma = settings.learn_parameters ? settings.parameter_deviation : 0.0;
+  const bool learns_any = settings.learn_parameters;
+  const double sigma = learns_any ? settings.parameter_deviation : 0.0;
+  const double load_sigma = learns_any ? settings.load_deviation.value_or(sigma) : 0.0;
   for_groups([&](auto& errors, auto&, int first) {
     using Vector = typename std::remove_cvref_t<decltype(errors)>::Vector;
     errors.reset(1.0, 1.0, Vector::Ones(errors.velocity()), sigma * sigma);
-    if (!settings.learn_parameters || settings.payload_deviation == 0.0) return true;
+    errors.set_load_variance(load_sigma * load_sigma);
+    if (!learns_any || settings.payload_deviation == 0.0) return true;
     const int segments = errors.velocity() / 2;
     Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, 5 * kJoint, 1> payload(5 * segments);
     payload.setZero();

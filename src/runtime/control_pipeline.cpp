@@ -5,6 +5,7 @@
 
 #include "softarm/actuation/actuator_inverse.hpp"
 #include "softarm/base/time.hpp"
+#include "softarm/control/repetition.hpp"
 #include "softarm/estimation/model_observer.hpp"
 #include "softarm/model/actuation_matrix.hpp"
 #include "softarm/model/coordinates.hpp"
@@ -47,6 +48,19 @@ std::unique_ptr<ModelObserver> make_observer(const PipelineSettings& settings) {
                      .dead_time_s = settings.control.dead_time_s});
 }
 
+std::unique_ptr<RepetitiveCompensation> make_repetition(const PipelineSettings& settings) {
+  const double lead_s = settings.control.repetition.lead_s;
+  if (!(lead_s > 0.0) || settings.estimation.observer != ObserverKind::model) return nullptr;
+  return std::make_unique<RepetitiveCompensation>(settings.arm, lead_s, 1.0 / settings.rate_hz);
+}
+
+std::vector<double> periods_s(const PipelineSettings& settings) {
+  std::vector<double> out;
+  for (const ReferencePhase& phase : settings.reference.phases)
+    out.push_back(settings.control.repetition.period_s.value_or(period_s(phase)));
+  return out;
+}
+
 /// Of segments that stretch, at this pressure in all chambers; empty where they do not.
 SegmentScalars elongation(const PipelineSettings& settings, double pressure_bar) {
   if (!settings.arm.extensible) return {};
@@ -70,6 +84,8 @@ ControlPipeline::ControlPipeline(const PipelineSettings& settings)
       observer_(make_observer(settings)),
       newest_frames_(observer_ ? NewestFrames::most(settings.arm.size(), period_s_) : 0),
       contact_watch_(make_contact_watch(settings)),
+      repetition_(make_repetition(settings)),
+      periods_s_(periods_s(settings)),
       delay_ns_(observer_ ? to_ns(settings.control.dead_time_s) : 0),
       safety_(settings.safety, period_s_),
       activation_limit_(settings.safety),
@@ -144,6 +160,7 @@ const TickOutput& ControlPipeline::tick(const TickInput& input) noexcept {
     reference_.start(seconds(act_ns), output_.motion.u_rad, at_rest);
     if (elongation_) elongation_->start(seconds(act_ns), output_.motion.u_rad);
     law_->reset();
+    repeating_phase_ = -1;
     if (inverse_) inverse_->start();
     active_since_ns_ = input.now_ns;
     ++activations_;
@@ -317,6 +334,20 @@ const ModelCorrection* ControlPipeline::correction() noexcept {
   return &yielding_;
 }
 
+/// With what repeats along the reference, as far ahead as is configured.
+const ModelCorrection* ControlPipeline::ahead(const ModelCorrection* found,
+                                              std::int64_t at_ns) noexcept {
+  if (!repetition_ || found == nullptr) return found;
+  const Reference::Place place = reference_.place(seconds(at_ns));
+  if (place.phase != repeating_phase_)
+    repetition_->start(periods_s_[static_cast<std::size_t>(place.phase)]);
+  repeating_phase_ = place.phase;
+  ahead_ = *found;
+  const bool learn = !output_.saturated && !output_.contact && !output_.observer->surprised();
+  repetition_->advance(place.since_s, learn, ahead_);
+  return &ahead_;
+}
+
 /// Of the newest accepted frame. The filter takes every frame, the observer, which costs more, those
 /// of a tick that are not `too_many`.
 void ControlPipeline::use_frame(bool too_many) noexcept {
@@ -460,7 +491,7 @@ void ControlPipeline::control(std::int64_t act_ns) noexcept {
   double lookahead_s = law_->lookahead_s();
   if (elongation_) lookahead_s = std::max(lookahead_s, ElongationReference::kLookahead_s);
   reference_.window(seconds(act_ns + ahead_ns), lookahead_s, window_);
-  const ModelCorrection* const found = correction();
+  const ModelCorrection* const found = ahead(correction(), act_ns + ahead_ns);
   if (elongation_) {
     const DisturbanceRejection use = settings_.control.disturbance;
     elongation_->advance(seconds(act_ns + ahead_ns), lookahead_s, window_,

@@ -37,6 +37,12 @@ const char* name(LiveVerdict verdict) noexcept;
 /// Largest theta that a reference reaches, live ones apart (0).
 double largest_theta_rad(const ReferenceSettings& settings) noexcept;
 
+/// Whether a time is a whole number of periods, one or more, to rounding (1e-6).
+bool whole_periods(double time_s, double period_s) noexcept;
+
+/// After which a phase repeats, s; 0: not, or not that it is known beforehand.
+double period_s(const ReferencePhase& phase) noexcept;
+
 /// The phases of an experiment. Times are seconds of any one clock of the caller's. No allocation
 /// after construction.
 ///
@@ -76,6 +82,13 @@ class Reference {
   /// Lets a phase in task space go on to `time_s`, and such phases begin and end; nothing happens
   /// for other phases. Bounded work. Does nothing before the first start().
   void advance(double time_s) noexcept;
+
+  /// Which phase a time belongs to (0, 1, ...), as sample() has it, and the time (s) since it began.
+  struct Place {
+    int phase;
+    double since_s;
+  };
+  Place place(double time_s) const noexcept;
 
   /// The tip (m, world frame) as measured at `time_s`; start() and phases in task space use the
   /// newest.

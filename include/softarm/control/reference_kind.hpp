@@ -76,7 +76,8 @@ struct ReferencePlace {
 
 struct ControllerSettings;
 
-/// What every kind has. A kind that is a path of the tip or not as its settings say has both sets of
+/// What every kind has. One that repeats has `double period_s() const noexcept` (0: it does not
+/// after all), from where on control.repetition knows it. A kind that is a path of the tip or not as its settings say has both sets of
 /// functions and `bool is_tip_path() const noexcept`. `check` throws ReferenceError for settings that do not fit the limits or an
 /// arm of so many segments.
 template <class K>
@@ -124,6 +125,7 @@ class ReferenceInterface {
   virtual double largest_theta_rad() const noexcept = 0;
   virtual double largest_speed_radps() const noexcept = 0;
   virtual void evaluate(double time_s, ReferenceSample& out) const noexcept = 0;
+  virtual double period_s() const noexcept = 0;
   virtual bool is_tip_path() const noexcept = 0;
   virtual TipReference tip(double time_s) const noexcept = 0;
 };
@@ -147,6 +149,8 @@ class ReferenceKind : public NamedKind<ReferenceInterface> {
   void evaluate(double time_s, ReferenceSample& out) const noexcept {
     model().evaluate(time_s, out);
   }
+  /// After which it repeats, s; 0: not, or not that it is known.
+  double period_s() const noexcept { return model().period_s(); }
   bool is_tip_path() const noexcept { return model().is_tip_path(); }
   /// Of a path of the tip.
   TipReference tip(double time_s) const noexcept { return model().tip(time_s); }
@@ -174,6 +178,10 @@ class ReferenceKind : public NamedKind<ReferenceInterface> {
     }
     void evaluate(double time_s, ReferenceSample& out) const noexcept override {
       if constexpr (CurvatureReference<K>) value.evaluate(time_s, out);
+    }
+    double period_s() const noexcept override {
+      if constexpr (requires { value.period_s(); }) return value.period_s();
+      return 0.0;
     }
     bool is_tip_path() const noexcept override {
       if constexpr (requires { value.is_tip_path(); }) return value.is_tip_path();

@@ -44,6 +44,7 @@ struct PaperReference {
   void check(const ReferencePlace& place, const ControllerSettings& control, int segments) const;
   double largest_theta_rad() const noexcept { return theta_rad; }
   double largest_speed_radps() const noexcept;
+  double period_s() const noexcept;  ///< of what follows the rise
   void evaluate(double time_s, ReferenceSample& out) const noexcept;
 };
 
@@ -62,6 +63,7 @@ struct WayPointReference {
   void check(const ReferencePlace& place, const ControllerSettings& control, int segments) const;
   double largest_theta_rad() const noexcept;
   double largest_speed_radps() const noexcept;
+  double period_s() const noexcept;
   void evaluate(double time_s, ReferenceSample& out) const noexcept;
 };
 
@@ -111,6 +113,7 @@ class TableReference {
   TipReference tip(double time_s) const noexcept;
   /// Time of the last point, from the first; 0 without a table.
   double duration_s() const noexcept;
+  double period_s() const noexcept { return repeat ? duration_s() : 0.0; }
 
  private:
   std::shared_ptr<const TableCurve> curve_;
@@ -135,6 +138,7 @@ struct TipPathReference {
   const char* name() const noexcept;
   void describe(Keys& key);
   void check(const ReferencePlace& place, const ControllerSettings& control, int segments) const;
+  double period_s() const noexcept;
   TipReference tip(double time_s) const noexcept;
   /// How far the path goes from a point, at 720 instants of its period.
   double largest_distance_m(const Eigen::Vector3d& from_m) const noexcept;

@@ -43,6 +43,12 @@ enum class DisturbanceRejection {
   none         ///< the configured model
 };
 
+/// What repeats along a periodic reference is learnt and compensated ahead (RepetitiveCompensation).
+struct RepetitionSettings {
+  double lead_s = 0.0;                  ///< 0: it is not
+  std::optional<double> period_s = {};  ///< none: that of the reference's phase
+};
+
 /// The controller (17): its terms, gains and limits.
 struct ControllerSettings {
   LawKind law;  ///< what follows belongs to `curvature` and `statics_pi`, limits apart
@@ -58,6 +64,7 @@ struct ControllerSettings {
   /// The same along e of segments that stretch, one a segment: N/m, N s/m, N/(m s). Empty: zero.
   std::vector<double> kp_axial, kd_axial, ki_axial;
   DisturbanceRejection disturbance = DisturbanceRejection::cancel;
+  RepetitionSettings repetition;
   double valve_lag_s = 0.0;
   double dead_time_s = 0.0;
   double max_theta_rad = 2.5;

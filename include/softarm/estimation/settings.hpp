@@ -2,6 +2,9 @@
 // config/template.yaml documents every setting.
 #pragma once
 
+#include <optional>
+#include <vector>
+
 namespace softarm {
 
 /// What u is taken from.
@@ -22,6 +25,10 @@ struct ModelObserverSettings {
   bool learn_parameters = true;
   double parameter_deviation = 0.2;
   double payload_deviation = 0.0;
+  /// Horizontal load of every segment before anything was learnt, two numbers each (see
+  /// SegmentCorrection); empty: zero. And its standard deviation; none: parameter_deviation.
+  std::vector<double> load;
+  std::optional<double> load_deviation;
   double parameter_drift_per_sqrt_s = 5e-4;
   double disturbance_drift_per_sqrt_s = 3e-3;
   double largest_disturbance_drift_per_sqrt_s = 0.045;

@@ -11,6 +11,7 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <vector>
 
 #include "softarm/actuation/pressure_allocator.hpp"
 #include "softarm/actuation/pressure_ramps.hpp"
@@ -33,6 +34,7 @@ namespace softarm {
 class ActuatorInverse;
 class ElongationReference;
 class ModelObserver;
+class RepetitiveCompensation;
 
 /// A live reference as it came over the wire: 2n numbers each; rad, rad/s, rad/s^2.
 struct LiveReferenceInput {
@@ -167,6 +169,7 @@ class ControlPipeline {
   void watch(const TickInput& input, SafetyInput& safety) noexcept;
   void watch_contact(const TickInput& input, SafetyInput& safety) noexcept;
   const ModelCorrection* correction() noexcept;
+  const ModelCorrection* ahead(const ModelCorrection* found, std::int64_t at_ns) noexcept;
   void use_frame(bool too_many) noexcept;
   void observe(const MocapFrame& frame, const CurvatureEstimate& estimate,
                const KnownMotion* expected) noexcept;
@@ -197,7 +200,11 @@ class ControlPipeline {
   SegmentVector
       missing_nm_;  ///< generalized force that measured pressures lack; empty: not measured
   std::int64_t wrong_model_since_ns_ = kNever;
-  ModelCorrection yielding_;  ///< the correction without what pushes
+  ModelCorrection yielding_;                            ///< the correction without what pushes
+  std::unique_ptr<RepetitiveCompensation> repetition_;  ///< where it is configured
+  std::vector<double> periods_s_;                       ///< of the reference's phases, for that
+  int repeating_phase_ = -1;  ///< that it learns; -1: it has just become ACTIVE
+  ModelCorrection ahead_;     ///< the correction with what repeats
   std::int64_t delay_ns_;     ///< that they and the controller look ahead by
   SafetyMonitor safety_;
   ActivationLimit activation_limit_;

@@ -12,9 +12,10 @@
 namespace softarm {
 
 void add_learned_option(CLI::App& command, std::string& file) {
-  command.add_option("--learned", file,
-                     "experiment to write: CONFIG with the stiffness, damping and gains that "
-                     "the model-based observer found");
+  command.add_option(
+      "--learned", file,
+      "experiment to write: CONFIG with the stiffness, damping, gains and horizontal "
+      "load that the model-based observer found");
 }
 
 LearnedOutput::LearnedOutput(const std::string& file, const Experiment& experiment,

@@ -108,6 +108,33 @@ TEST(LearnedArm, WithItPaper17TracksAWrongArmNearlyAsItsOwn) {
   EXPECT_LT(error_rad(wrong, learned), 1.5 * nominal_rad);
 }
 
+TEST(LearnedArm, ATiltIsKnownFromTheBeginning) {
+  const TestFolder folder;
+  Loop loop(observed("tilt 10 degrees"));
+  loop.run_until(20.0);
+  const fs::path file = folder / "learned.yaml";
+  std::ofstream(file) << learned_yaml(shipped("paper_arm_observer.yaml"), loop.report, "Learnt.",
+                                      shipped_file("paper_arm_observer.yaml"), file);
+  const Experiment learned = load_experiment(file);
+  const ModelObserverSettings& known = learned.estimation.model_observer;
+  ASSERT_EQ(known.load.size(), 6u);
+  ASSERT_TRUE(known.load_deviation.has_value());
+  const double tilt = std::tan(10.0 * std::numbers::pi / 180.0);
+  for (std::size_t i = 0; i < 6; i += 2)
+    EXPECT_NEAR(std::hypot(known.load[i], known.load[i + 1]), tilt, 0.3 * tilt) << i;
+
+  RobustnessScene scene = scene_named("tilt 10 degrees");
+  scene.counted_from_s = 0.1;
+  scene.counted_s = 2.0;
+  const auto error_rad = [&](const Experiment& e) { return run(e, scene, 1).u_rms_rad; };
+  Experiment again = observed("tilt 10 degrees");
+  const double before_rad = error_rad(again);
+  again.arm = learned.arm;
+  again.actuation = learned.actuation;
+  again.estimation.model_observer = known;
+  EXPECT_LT(error_rad(again), 0.5 * before_rad);
+}
+
 /// Pushed from 10 s on.
 Experiment pushed(const std::string& scene, const Eigen::Vector3d& force_n, double duration_s,
                   double start_s = 10.0) {

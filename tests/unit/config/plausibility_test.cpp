@@ -46,6 +46,18 @@ const Slip kRefused[] = {
     {"estimation: {max_speed_radps: 5000}\n", "", "estimation.max_speed_radps", "200] rad/s"},
     {"estimation: {position_noise_m: 0.2}\n", "", "estimation.position_noise_m", "0.02] m"},
     {"control: {max_speed_radps: 1000}\n", "", "control.max_speed_radps", "100] rad/s"},
+    // What repeats is learnt from what the observer finds, and where the reference repeats.
+    {"control: {repetition: {lead_s: 0.1, period_s: 3}}\n", "", "control.repetition.lead_s",
+     "0 s without estimation.observer: model"},
+    {"estimation: {observer: model}\ncontrol: {disturbance: none, repetition: {lead_s: 0.1, "
+     "period_s: 3}}\n",
+     "", "control.repetition.lead_s", "0 s without control.disturbance: cancel"},
+    {"estimation: {observer: model}\ncontrol: {repetition: {lead_s: 0.1}}\n", "",
+     "control.repetition.lead_s", "0 s where no phase of the reference repeats"},
+    {"estimation: {observer: model}\ncontrol: {repetition: {lead_s: 0.6, period_s: 1}}\n", "",
+     "control.repetition.lead_s", "less than half of the period (0.5 s)"},
+    {"estimation: {observer: model}\ncontrol: {repetition: {lead_s: 0.01, period_s: 0.1}}\n", "",
+     "control.repetition.period_s", "(0.128 s)"},
     {"control: {valve_lag_s: 5}\n", "", "control.valve_lag_s", "[0, 2] s"},
     {"control: {delay_s: 5}\n", "", "control.delay_s", "[0, 0.5] s"},
     // An unstable loop swings at one to two Hz, whatever its reference does.

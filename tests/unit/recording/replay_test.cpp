@@ -162,6 +162,25 @@ TEST_F(LockStepReplay, TheModelObserverToo) {
   EXPECT_EQ(summary.commands.compared, run.ticks);
 }
 
+TEST_F(LockStepReplay, WhatIsLearntAlongAPeriodToo) {
+  Experiment experiment = experiment_;
+  experiment.estimation.observer = ObserverKind::model;
+  experiment.estimation.model_observer.learn_parameters = false;  // settled from the beginning
+  PaperReference fast;
+  fast.rate_radps = 12.0;
+  experiment.reference.phases = {{fast, 0.0}};
+  Experiment without = experiment;
+  experiment.control.repetition.lead_s = 0.05;
+  LogBytes log;
+  const auto run = test::record_run(experiment, 15.0, false, log);
+  const ReplaySummary summary = replay(log.bytes, experiment).summary;
+  EXPECT_TRUE(summary.complete());
+  EXPECT_FALSE(summary.different());
+  EXPECT_EQ(summary.commands.compared, run.ticks);
+  // It was there to be reproduced.
+  EXPECT_TRUE(replay(log.bytes, without, true).summary.different());
+}
+
 TEST_F(LockStepReplay, AFlippedBitInACommandIsFoundAndNamed) {
   std::vector<std::size_t> ends;
   const auto commands = events_on(log_.bytes, experiment_.transport.lcm.command_channel, ends);

@@ -32,6 +32,8 @@ TEST(PipelineAllocation, TenThousandTicksThroughAllModes) {
         {u, ObserverKind::model, ActuatorInverseSettings{}},
         {u, ObserverKind::model, everything}}) {
     experiment.actuator_inverse = inverse;
+    // At no cost where there is no model observer.
+    experiment.control.repetition = {.lead_s = 0.1, .period_s = 1.0};
     experiment.control.coordinates = coordinates;
     experiment.estimation.observer = observer;
     const auto bench = std::make_unique<PipelineBench>(experiment);

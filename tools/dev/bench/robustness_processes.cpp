@@ -1,5 +1,5 @@
 // A row of softarm-dev bench robustness over LCM: softarmd and softarm-plant as they run beside an
-// arm.
+// arm, and a relay between them where frames are to be lost.
 #include <fmt/format.h>
 #include <signal.h>
 #include <unistd.h>
@@ -9,10 +9,13 @@
 #include <filesystem>
 #include <fstream>
 #include <limits>
+#include <optional>
 #include <stdexcept>
+#include <vector>
 
 #include "dev/bench/robustness_scenes.hpp"
 #include "dev/child_process.hpp"
+#include "dev/fault/fault_relay.hpp"
 #include "softarm/base/clock.hpp"
 #include "softarm/base/time.hpp"
 #include "softarm/config/load.hpp"
@@ -47,18 +50,18 @@ class Place {
   fs::path folder_;
 };
 
-}  // namespace
-
-bool needs_lock_step(const RobustnessScene& scene) {
-  const LoopFaults& faults = scene.faults;
-  return faults.frame || faults.play_bar > 0.0 || faults.resolution_bar > 0.0 ||
-         faults.hysteresis > 0.0;
+/// What the faults of a scene do to frames now.
+Fault fault_at(const FrameFaults& faults, std::int64_t now_ns) {
+  const double since_s = to_seconds(now_ns % 1'000'000'000);
+  if (since_s < faults.lost_s) return {.kind = FaultKind::stop};
+  if (since_s < faults.occluded_s) return {.kind = FaultKind::occlude, .body = 2};
+  return {};
 }
+
+}  // namespace
 
 RobustnessTrial run_processes(const Experiment& asked, const RobustnessScene& scene,
                               std::uint64_t seed) {
-  if (needs_lock_step(scene))
-    throw std::invalid_argument(scene.name + ": no configuration describes these faults");
   const Place place;
   Experiment e = asked;
   e.seed = e.plant.seed = seed;
@@ -80,14 +83,22 @@ RobustnessTrial run_processes(const Experiment& asked, const RobustnessScene& sc
       trial.stayed_active &= active || !began;
       began |= active;
     });
-  ChildProcess plant(program_beside_this("softarm-plant"), {config.string()},
+  std::vector<std::string> plant_arguments = {config.string()};
+  std::optional<FaultRelay> relay;
+  if (scene.faults.lost_s > 0.0 || scene.faults.occluded_s > 0.0) {
+    plant_arguments.insert(plant_arguments.end(), {"--sensor-suffix", kSensorSuffix});
+    relay.emplace(lcm, kSensorSuffix);
+  }
+  ChildProcess plant(program_beside_this("softarm-plant"), plant_arguments,
                      place.file("plant.txt").string());
   ChildProcess daemon(program_beside_this("softarmd"), {config.string()},
                       place.file("daemon.txt").string());
   const double until_s = scene.counted_from_s + scene.counted_s;
   const std::int64_t end_ns = monotonic_now_ns() + to_ns(until_s + kPatience_s);
-  while (record.active_s() < until_s && monotonic_now_ns() < end_ns)
+  while (record.active_s() < until_s && monotonic_now_ns() < end_ns) {
+    if (relay && began) relay->set(fault_at(scene.faults, monotonic_now_ns()));
     node.wait_until(monotonic_now_ns() + 10'000'000);
+  }
   for (ChildProcess* each : {&daemon, &plant}) {
     each->signal(SIGTERM);
     each->wait(std::chrono::seconds(5));

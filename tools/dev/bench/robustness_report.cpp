@@ -1,6 +1,7 @@
 // The table and the JSON of softarm-dev bench robustness.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
@@ -34,13 +35,19 @@ std::string table(const std::vector<RobustnessRow>& rows, const std::vector<Obse
       text += fmt::format("{:>23}", cell_text(cell.worst));
     text += row.bound_mrad > 0.0 ? fmt::format("{:>8.3g}\n", row.bound_mrad) : "\n";
   }
-  const RobustnessLaw last = rows.front().cells.back().law;
-  text += fmt::format("\n{}:\n{:<36}{:>10}{:>10}{:>10}{:>10}{:>10}{:>8}{:>10}\n", name(last), "",
+  // In detail: the observer with parameters where it was run, the last law otherwise.
+  const auto& cells = rows.front().cells;
+  auto at = std::find_if(cells.begin(), cells.end(), [](const RobustnessCell& cell) {
+    return cell.law == RobustnessLaw::observer_parameters;
+  });
+  if (at == cells.end()) --at;
+  const auto detailed = static_cast<std::size_t>(at - cells.begin());
+  text += fmt::format("\n{}:\n{:<36}{:>10}{:>10}{:>10}{:>10}{:>10}{:>8}{:>10}\n", name(at->law), "",
                       "largest", "tip", "pressure", "tick", "frame", "NIS", "surprised");
   text += fmt::format("{:<36}{:>10}{:>10}{:>10}{:>10}{:>10}{:>8}{:>10}\n", "", "[mrad]", "[mm]",
                       "[bar/s]", "[us]", "[us]", "", "[%]");
   for (const RobustnessRow& row : rows) {
-    const RobustnessTrial& trial = row.cells.back().worst;
+    const RobustnessTrial& trial = row.cells[detailed].worst;
     text += fmt::format("{:<36}{:>10.3g}{:>10.3g}{}{}{}{:>8.3f}{:>10.2g}\n", row.scene,
                         1e3 * trial.u_largest_rad, 1e3 * trial.tip_rms_m,
                         column(trial.pressure_rate_bar_per_s, 0), column(trial.tick_us, 1),

@@ -90,15 +90,6 @@ void held(Experiment& e) {
   e.reference.phases = {{pose, 0.0}};
 }
 
-bool silent_each_second(MocapFrame& frame) {
-  return frame.capture_ns < 2'000'000'000 || frame.capture_ns % 1'000'000'000 >= 200'000'000;
-}
-bool occluded_each_second(MocapFrame& frame) {
-  if (frame.capture_ns >= 2'000'000'000 && frame.capture_ns % 1'000'000'000 < 100'000'000)
-    frame.body[2].valid = false;
-  return true;
-}
-
 }  // namespace
 
 std::vector<RobustnessScene> robustness_scenes() {
@@ -131,10 +122,14 @@ std::vector<RobustnessScene> robustness_scenes() {
   });
   add("links plant", 1.0, [](Experiment& e) { e.plant.kind = LinkSettings{}; });
   add("refined plant", 1.0, [](Experiment& e) { e.plant.kind = RefinedSettings{}; });
-  add("hysteresis 15 %", 5.0, [](Experiment&) {}).faults.hysteresis = 0.15;
-  LoopFaults& play = add("valve play 12.5 mbar, steps 10 mbar", 7.0, [](Experiment&) {}).faults;
-  play.play_bar = 0.0125;
-  play.resolution_bar = 0.01;
+  add("hysteresis 15 %", 5.0, [](Experiment& e) {
+    e.plant.material.hysteresis = 0.15;
+    e.plant.material.play_bar = {0.02, 0.05, 0.1};
+  });
+  add("valve play 12.5 mbar, steps 10 mbar", 7.0, [](Experiment& e) {
+    e.plant.valves.play_bar = 0.0125;
+    e.plant.valves.resolution_bar = 0.01;
+  });
   add("20 %, 8 rad/s", 2.0, after(mismatched(0.2), fast));
   add("20 %, through theta = 0", 1.2, after(mismatched(0.2), through_straight));
   add("lag 40 ms, 20 configured", 1.2, [](Experiment& e) { e.plant.valves.lag_s = 0.04; });
@@ -144,8 +139,8 @@ std::vector<RobustnessScene> robustness_scenes() {
       [](Experiment& e) { e.plant.valves.dead_time_s = e.control.dead_time_s = 0.03; });
   add("50 % of frames lost", 1.1,
       after(patient, [](Experiment& e) { e.plant.mocap.dropout_probability = 0.5; }));
-  add("200 ms without frames each second", 1.1, patient).faults.frame = silent_each_second;
-  add("a body occluded 100 ms each second", 1.1, patient).faults.frame = occluded_each_second;
+  add("200 ms without frames each second", 1.1, patient).faults.lost_s = 0.2;
+  add("a body occluded 100 ms each second", 1.1, patient).faults.occluded_s = 0.1;
   add("nominal plant, ideal sensing", 0.03, [](Experiment&) {}).nominal = true;
   add("the same, 20 % wrong", 0.2, mismatched(0.2)).nominal = true;
   for (const bool wrong : {false, true}) {
@@ -168,6 +163,8 @@ const char* name(RobustnessLaw law) {
       return "observer";
     case RobustnessLaw::observer_parameters:
       return "observer + parameters";
+    case RobustnessLaw::observer_repetition:
+      return "observer + repetition";
   }
   return "unknown";
 }
@@ -189,11 +186,13 @@ Experiment robustness_experiment(const RobustnessScene& scene, RobustnessLaw law
       std::fill(e.control.ki.begin(), e.control.ki.end(), 1.0);
       break;
     case RobustnessLaw::observer:
-    case RobustnessLaw::observer_parameters: {
+    case RobustnessLaw::observer_parameters:
+    case RobustnessLaw::observer_repetition: {
       const Experiment observer = config("paper_arm_observer.yaml");
       e.estimation.observer = observer.estimation.observer;
       e.estimation.model_observer = observer.estimation.model_observer;
-      e.estimation.model_observer.learn_parameters = law == RobustnessLaw::observer_parameters;
+      e.estimation.model_observer.learn_parameters = law != RobustnessLaw::observer;
+      if (law == RobustnessLaw::observer_repetition) e.control.repetition.lead_s = 0.1;
       e.control.kp = observer.control.kp;
       e.control.kd = observer.control.kd;
       // Without a lag there is nothing that K_D could damp, and its bound is tighter.

@@ -8,19 +8,13 @@
 #include <vector>
 
 #include "softarm/config/experiment.hpp"
-#include "softarm/estimation/mocap_frame.hpp"
 
 namespace softarm {
 
-/// What stands between the loop and the simulated arm, beyond what PlantSettings knows.
-struct LoopFaults {
-  /// Changes a frame on its way; false: it does not arrive.
-  std::function<bool(MocapFrame&)> frame;
-  double play_bar = 0.0;        ///< half the backlash between set point and pressure, every valve
-  double resolution_bar = 0.0;  ///< of the pressure behind it
-  /// Part of every pressure that goes through play operators of 0.02, 0.05 and 0.1 bar: loops
-  /// between pressure and moment, as a material with hysteresis has.
-  double hysteresis = 0.0;
+/// What happens to frames on their way in every second, beyond what PlantSettings knows.
+struct FrameFaults {
+  double lost_s = 0.0;      ///< no frame arrives, from the second's beginning on
+  double occluded_s = 0.0;  ///< the end of segment 2 is not seen, likewise
 };
 
 /// One row of the table.
@@ -28,7 +22,7 @@ struct RobustnessScene {
   std::string name;
   double bound_mrad = 0.0;  ///< of the observer with parameters; 0: none
   std::function<void(Experiment&)> change;
-  LoopFaults faults;
+  FrameFaults faults;
   bool nominal = false;         ///< no lag, exact sensing: paper_arm_nominal.yaml
   double counted_from_s = 1.0;  ///< after ACTIVE
   double counted_s = 20.0;
@@ -37,10 +31,20 @@ struct RobustnessScene {
 std::vector<RobustnessScene> robustness_scenes();
 
 /// A control law of the comparison, from the experiments that come with softarm.
-enum class RobustnessLaw { paper17, statics_pi, integral, observer, observer_parameters };
-inline constexpr RobustnessLaw kRobustnessLaws[] = {
-    RobustnessLaw::paper17, RobustnessLaw::statics_pi, RobustnessLaw::integral,
-    RobustnessLaw::observer, RobustnessLaw::observer_parameters};
+enum class RobustnessLaw {
+  paper17,
+  statics_pi,
+  integral,
+  observer,
+  observer_parameters,
+  observer_repetition
+};
+inline constexpr RobustnessLaw kRobustnessLaws[] = {RobustnessLaw::paper17,
+                                                    RobustnessLaw::statics_pi,
+                                                    RobustnessLaw::integral,
+                                                    RobustnessLaw::observer,
+                                                    RobustnessLaw::observer_parameters,
+                                                    RobustnessLaw::observer_repetition};
 const char* name(RobustnessLaw law);
 
 /// `config(name)` loads an experiment that comes with softarm.
@@ -61,12 +65,10 @@ struct RobustnessTrial {
 };
 RobustnessTrial run(const Experiment& experiment, const RobustnessScene& scene, std::uint64_t seed);
 
-/// Whether its faults stand between the programs, where no configuration puts them.
-bool needs_lock_step(const RobustnessScene& scene);
 /// The same over LCM, in real time: softarmd and softarm-plant beside this program, on a port that its
-/// process number chooses. Pressures and times of the tick are not measured (NaN).
-/// @throws std::invalid_argument where the scene needs lock step; TransportError; std::runtime_error
-/// where the arm was never ACTIVE
+/// process number chooses; where frames are to be lost, a relay in this program loses them. Pressures
+/// and times of the tick are not measured (NaN).
+/// @throws TransportError; std::runtime_error where the arm was never ACTIVE
 RobustnessTrial run_processes(const Experiment& experiment, const RobustnessScene& scene,
                               std::uint64_t seed);
 

@@ -13,45 +13,14 @@
 namespace softarm {
 namespace {
 
-/// Backlash: the output follows the input at a distance of at most `half_width`.
-double play(double output, double input, double half_width) {
-  return std::clamp(output, input - half_width, input + half_width);
+/// False: it does not arrive. The first two seconds are without faults: the arm becomes ACTIVE.
+bool passes(const FrameFaults& faults, MocapFrame& frame) {
+  constexpr std::int64_t kSecond_ns = 1'000'000'000;
+  if (frame.capture_ns < 2 * kSecond_ns) return true;
+  const std::int64_t since_ns = frame.capture_ns % kSecond_ns;
+  if (since_ns < to_ns(faults.occluded_s)) frame.body[2].valid = false;
+  return since_ns >= to_ns(faults.lost_s);
 }
-
-/// Valves with backlash, and chambers whose moment depends on the way they were filled.
-class CommandFaults {
- public:
-  CommandFaults(const LoopFaults& faults, Eigen::Index chambers) : faults_(faults) {
-    valve_.setZero(chambers);
-    for (PressureVector& each : inner_) each.setZero(chambers);
-  }
-
-  void apply(PressureVector& bar) {
-    static constexpr double kInnerPlay_bar[] = {0.02, 0.05, 0.1};
-    for (Eigen::Index j = 0; j < bar.size(); ++j) {
-      if (faults_.play_bar > 0.0) {
-        valve_[j] = play(valve_[j], bar[j], faults_.play_bar);
-        bar[j] = valve_[j];
-      }
-      if (faults_.resolution_bar > 0.0)
-        bar[j] = faults_.resolution_bar * std::round(bar[j] / faults_.resolution_bar);
-      if (faults_.hysteresis > 0.0) {
-        double mean = 0.0;
-        for (std::size_t k = 0; k < inner_.size(); ++k) {
-          inner_[k][j] = play(inner_[k][j], bar[j], kInnerPlay_bar[k]);
-          mean += inner_[k][j] / static_cast<double>(inner_.size());
-        }
-        bar[j] += faults_.hysteresis * (mean - bar[j]);
-      }
-      bar[j] = std::max(bar[j], 0.0);
-    }
-  }
-
- private:
-  LoopFaults faults_;
-  PressureVector valve_;
-  std::array<PressureVector, 3> inner_;
-};
 
 double quantile_us(std::vector<std::int64_t>& durations_ns, double fraction) {
   const auto at = durations_ns.begin() +
@@ -67,12 +36,10 @@ RobustnessTrial run(const Experiment& asked, const RobustnessScene& scene, std::
   e.plant.seed = seed;
   ControlPipeline pipeline(e);
   SimulatedArm arm(e.plant, 0);
-  CommandFaults faults(scene.faults, pipeline.output().pressure_bar.size());
   const std::int64_t period_ns = pipeline.period_ns();
   const std::int64_t validity_ns = to_ns(e.safety.command_validity_s);
   std::vector<MocapFrame> frames;
-  std::vector<double> sent;
-  PressureVector measured, wanted, before;
+  PressureVector measured, before;
   std::vector<std::int64_t> ticks_ns;
   RobustnessTrial trial;
   double u_squares = 0.0, tip_squares = 0.0, rate_squares = 0.0, nis = 0.0;
@@ -86,7 +53,7 @@ RobustnessTrial run(const Experiment& asked, const RobustnessScene& scene, std::
     arm.advance_to(now_ns);
     frames.clear();
     for (MocapFrame frame; arm.receive(frame);)
-      if (!scene.faults.frame || scene.faults.frame(frame)) frames.push_back(frame);
+      if (passes(scene.faults, frame)) frames.push_back(frame);
     measured = arm.measured_pressures_bar();
     TickInput input;
     input.now_ns = now_ns;
@@ -97,14 +64,7 @@ RobustnessTrial run(const Experiment& asked, const RobustnessScene& scene, std::
     const std::int64_t begin_ns = monotonic_now_ns();
     const TickOutput& output = pipeline.tick(input);
     ticks_ns.push_back(monotonic_now_ns() - begin_ns);
-    wanted = output.pressure_bar;
-    faults.apply(wanted);
-    sent.assign(wanted.begin(), wanted.end());
-    arm.command({.sequence = now_ns / period_ns + 1,
-                 .validity_ns = validity_ns,
-                 .shadow = false,
-                 .pressure_bar = sent},
-                now_ns);
+    arm.command(output.pressure_bar, validity_ns, now_ns);
     if (output.mode != Mode::active) {
       trial.stayed_active &= active_since_ns < 0;
       continue;

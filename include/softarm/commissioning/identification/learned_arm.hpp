@@ -9,9 +9,9 @@
 
 namespace softarm {
 
-/// The experiment's arm and chambers with the observer's corrections of stiffness, damping and gain.
-/// A horizontal load (a tilt, a payload, a force on the tip) has no place in a configuration and is
-/// left out.
+/// The experiment's arm and chambers with the observer's corrections of stiffness, damping and gain,
+/// and its horizontal load (a tilt, a payload, a force on the tip) as what the observer starts from,
+/// with the largest of its standard deviations.
 Experiment corrected(const Experiment& experiment, const ObserverReport& learned);
 
 /// An experiment that includes `config`, with what was learnt in place of the configured values; the
