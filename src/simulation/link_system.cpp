@@ -272,7 +272,7 @@ void LinkSystem<kStretches>::inertia(ConstVector x, Matrix B) {
     const Vec3 along = rotation_[j].col(2);
     const Vec3 centre = origin_[j] + 0.5 * length_m(j, x) * along;
     const Eigen::Index k = kWidth * static_cast<Eigen::Index>(j);
-    if constexpr (kStretches) {  // carries what is beyond, and half of its own link's mass
+    if constexpr (kStretches) {  // carries what is beyond, and half of the link
       const double carried_kg = mass + link.payload_kg + 0.5 * link.mass_kg;
       const Vec3 moment = first + (carried_kg - mass) * origin_[j];
       momentum_.col(k + 2) << moment.cross(along), carried_kg * along;

@@ -75,7 +75,7 @@ class LinkSystem final : public PlantSystem {
     if constexpr (kStretches) return spread_kg(link) * length_m * length_m;
     return links_[link].inertia_kgm2;
   }
-  /// What a link that stretches has of its own inertia along itself, beside that of its centre.
+  /// The inertia along a link that stretches beside that of its centre, on the rate of its length.
   double spread_kg(std::size_t link) const {
     return links_[link].inertia_kgm2 / (links_[link].length_m * links_[link].length_m);
   }

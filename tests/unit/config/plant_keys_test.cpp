@@ -122,7 +122,9 @@ TEST(PlantKeys, SegmentsThatStretch) {
           "plant.arm.extensible: expected false, true or");
   refuses("plant: {arm: {extensible: [1, 0]}}\n", 7, "plant.arm.extensible");
   refuses("plant: {arm: {extensible: [1, 0, 2]}}\n", 7, "plant.arm.extensible");
-  refuses("plant: {kind: links, arm: {extensible: true}}\n", 7, "for kind links");
+  refuses("plant: {kind: refined, refined: {pieces: 29}, arm: {extensible: true}}\n", 7,
+          "1 to 85 pieces");
+  EXPECT_TRUE(load("plant: {kind: links, arm: {extensible: true}}\n").plant.arm.extensible);
   for (const char* term :
        {"cubic_per_rad2", "stiffening_per_bar", "remanence", "remanence_2", "bouc_wen"})
     refuses(std::string("plant: {kind: links, material: {") + term + ": 0.1}}\n", 7,
