@@ -21,6 +21,7 @@ Experiment observed(int segments) {
   it.actuation.segments.resize(it.arm.segments.size(), it.actuation.segments.front());
   for (std::vector<double>* gains : {&it.control.kp, &it.control.kd, &it.control.ki})
     if (!gains->empty()) gains->assign(2 * it.arm.segments.size(), gains->front());
+  it.estimation.model_observer.load.clear();
   it.reference.phases = {{PaperReference{.theta_rad = 0.2}, 0.0}};
   it.estimation.observer = ObserverKind::model;
   it.safety.arming = Arming::automatic;
