@@ -14,9 +14,9 @@ Experiment shipped_experiment(const std::string& name) {
   return load_experiment(std::filesystem::path(SOFTARM_SOURCE_DIR) / "config" / name);
 }
 
-void holds(const RobustnessScene& scene, int seeds) {
-  const Experiment experiment =
-      robustness_experiment(scene, RobustnessLaw::observer_parameters, shipped_experiment);
+void holds(const RobustnessScene& scene, int seeds, bool stretches = false) {
+  const Experiment experiment = robustness_experiment(scene, RobustnessLaw::observer_parameters,
+                                                      shipped_experiment, stretches);
   for (int seed = 1; seed <= seeds; ++seed) {
     const RobustnessTrial trial = run(experiment, scene, static_cast<std::uint64_t>(seed));
     EXPECT_TRUE(trial.stayed_active) << scene.name << ", seed " << seed;
@@ -39,6 +39,11 @@ TEST(Robustness, AFewArmsThatAreNotTheirModel) {
 TEST(RobustnessSlow, EveryRowForFiveSeeds) {
   for (const RobustnessScene& scene : robustness_scenes())
     if (scene.bound_mrad > 0.0) holds(scene, 5);
+}
+
+TEST(RobustnessSlow, EveryRowOnAnArmThatStretches) {
+  for (const RobustnessScene& scene : robustness_scenes())
+    if (scene.bound_mrad > 0.0) holds(scene, 1, true);
 }
 
 // With 110 to 150 g at the tip and 10 to 20 ms of dead time. Gains that may overshoot in the first
