@@ -235,4 +235,12 @@ void AxialObserver::put_deviation(ModelCorrection& deviation) const noexcept {
   }
 }
 
+void AxialObserver::put_elongation(SegmentScalars& e_m,
+                                   SegmentScalars& deviation_m) const noexcept {
+  e_m = now_.e_m;
+  deviation_m.resize(arm_.size());
+  for (Eigen::Index i = 0; i < arm_.size(); ++i)
+    deviation_m[i] = std::sqrt(std::max(0.0, P_[static_cast<std::size_t>(i)](0, 0)));
+}
+
 }  // namespace softarm

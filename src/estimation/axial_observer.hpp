@@ -63,6 +63,8 @@ class AxialObserver {
   /// Its axial members.
   void put(ModelCorrection& correction) const noexcept;
   void put_deviation(ModelCorrection& deviation) const noexcept;
+  /// e at the newest frame and its standard deviation, m.
+  void put_elongation(SegmentScalars& e_m, SegmentScalars& deviation_m) const noexcept;
   bool at_limit() const noexcept { return at_limit_; }
 
  private:

@@ -183,6 +183,7 @@ void ModelObserver::report(ObserverReport& out) const noexcept {
   out.nis = nis();
   out.correction = correction();
   deviation(out.deviation);
+  if (state_->axial) state_->axial->put_elongation(out.elongation_m, out.elongation_deviation_m);
 }
 
 void ModelObserver::deviation(ModelCorrection& out) const noexcept {

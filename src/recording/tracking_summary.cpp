@@ -165,11 +165,21 @@ struct TrackingSummary::Json {
     return json;
   }
 
-  static Value correction(const ModelCorrection& of, int segments) {
+  /// @param elongation_m empty where segments do not stretch
+  static Value correction(const ModelCorrection& of, const SegmentScalars& elongation_m,
+                          int segments) {
     Value json{{"stiffness", Value::array()},
                {"damping", Value::array()},
                {"gain", Value::array()},
                {"load", Value::array()}};
+    for (Eigen::Index i = 0; i < elongation_m.size(); ++i) {
+      const SegmentCorrection& segment = of.segment[static_cast<std::size_t>(i)];
+      json["elongation_m"].push_back(elongation_m[i]);
+      json["axial_force_n"].push_back(segment.axial_force_n);
+      json["axial_stiffness"].push_back(segment.axial_stiffness);
+      json["axial_damping"].push_back(segment.axial_damping);
+      json["axial_gain"].push_back(segment.axial_gain);
+    }
     for (int i = 0; i < segments; ++i) {
       const SegmentCorrection& segment = of.segment[static_cast<std::size_t>(i)];
       json["stiffness"].push_back(segment.stiffness);
@@ -182,15 +192,16 @@ struct TrackingSummary::Json {
 
   static Value observer(const TrackingSummary& of) {
     const ObserverReport& newest = *of.observer_;
-    return {{"correction", correction(newest.correction, of.segments_)},
-            {"deviation", correction(newest.deviation, of.segments_)},
-            {"disturbance_rms_nm", rms_of(of.disturbance_)},
-            {"disturbance_max_nm", of.disturbance_max_nm_},
-            {"nis", of.nis()},
-            {"surprised_fraction", of.surprised_fraction()},
-            {"wrong_model_fraction",
-             static_cast<double>(of.wrong_model_ticks_) / static_cast<double>(of.observed_ticks_)},
-            {"failures", newest.failures}};
+    return {
+        {"correction", correction(newest.correction, newest.elongation_m, of.segments_)},
+        {"deviation", correction(newest.deviation, newest.elongation_deviation_m, of.segments_)},
+        {"disturbance_rms_nm", rms_of(of.disturbance_)},
+        {"disturbance_max_nm", of.disturbance_max_nm_},
+        {"nis", of.nis()},
+        {"surprised_fraction", of.surprised_fraction()},
+        {"wrong_model_fraction",
+         static_cast<double>(of.wrong_model_ticks_) / static_cast<double>(of.observed_ticks_)},
+        {"failures", newest.failures}};
   }
 
   static Value modes(const TrackingSummary& of) {
@@ -258,6 +269,22 @@ std::string TrackingSummary::observer_table() const {
         pair(is.stiffness, sigma.stiffness, 100.0, 1), pair(is.damping, sigma.damping, 100.0, 1),
         pair(is.gain, sigma.gain, 100.0, 1), pair(is.load.x(), sigma.load.x(), 1.0, 3),
         pair(is.load.y(), sigma.load.y(), 1.0, 3), disturbance_[index].rms());
+  }
+  const SegmentScalars& e_m = observer_->elongation_m;
+  if (e_m.size() == segments_)
+    text +=
+        "segment    elongation [mm]            k_a [%]         beta_a [%]         area [%]"
+        "      axial force [N]\n";
+  for (int i = 0; i < e_m.size() && e_m.size() == segments_; ++i) {
+    const auto index = static_cast<std::size_t>(i);
+    const SegmentCorrection& is = observer_->correction.segment[index];
+    const SegmentCorrection& sigma = observer_->deviation.segment[index];
+    text += fmt::format("{:>7}   {:>16}   {:>16}   {:>16} {:>16}     {:>16}\n", i + 1,
+                        pair(e_m[i], observer_->elongation_deviation_m[i], 1e3, 2),
+                        pair(is.axial_stiffness, sigma.axial_stiffness, 100.0, 1),
+                        pair(is.axial_damping, sigma.axial_damping, 100.0, 1),
+                        pair(is.axial_gain, sigma.axial_gain, 100.0, 1),
+                        pair(is.axial_force_n, sigma.axial_force_n, 1.0, 2));
   }
   const auto percent = [this](std::int64_t ticks) {
     return 100.0 * static_cast<double>(ticks) / static_cast<double>(observed_ticks_);

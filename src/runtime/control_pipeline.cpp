@@ -505,7 +505,10 @@ void ControlPipeline::control(std::int64_t act_ns) noexcept {
   if (elongation_) elongation_->hold_constant_lengths(control_.tau_actuation_nm);
   allocate();
   law_->applied(period_s_, state, window_.now, allocation_.scale);
-  if (ahead_ns > 0) reference_.sample(seconds(act_ns), window_.now);
+  if (ahead_ns > 0) {
+    reference_.sample(seconds(act_ns), window_.now);
+    if (elongation_) elongation_->replace(seconds(act_ns), window_.now);
+  }
   output_.reference = window_.now;
   output_.reference_limited |= window_.now.limited;
   output_.tau_actuation_nm = control_.tau_actuation_nm;

@@ -53,39 +53,46 @@ ElongationReference::ElongationReference(const ArmParameters& arm,
                                          const ActuationSettings& actuation,
                                          const PressureAllocator& allocator)
     : arm_(arm), allocator_(allocator), workspace_(arm), horizontal_(arm) {
-  for (SegmentScalars* v : {&e_, &rate_, &acceleration_, &force_, &force_before_, &force_after_,
-                            &stiffness_, &damping_})
+  for (SegmentScalars* v : {&e_, &rate_, &acceleration_, &jerk_, &force_, &force_before_,
+                            &force_after_, &follows_, &stiffness_, &damping_, &carried_kg_})
     v->setZero(arm.size());
   for (SegmentVector* v : {&tau_, &along_x_, &along_y_}) v->setZero(arm.dof());
   bias_n_.setZero(arm.size());
   for (int i = 0; i < arm.size(); ++i)
     bias_n_[i] = axial_force_n(actuation, static_cast<std::size_t>(i), actuation.bias_pressure_bar);
+  Eigen::MatrixXd inertia(arm.dof(), arm.dof());
+  inertia_matrix(arm_, workspace_, Eigen::VectorXd::Zero(arm.dof()), inertia);
+  for (int i = 0; i < arm.size(); ++i)
+    for (int j = 0; j < arm.size(); ++j) carried_kg_[i] += inertia(3 * i + 2, 3 * j + 2);
 }
 
 void ElongationReference::start(double time_s, ConstVectorRef q) noexcept {
   time_s_ = time_s;
   for (int i = 0; i < arm_.size(); ++i) e_[i] = q[3 * i + 2];
-  rate_.setZero();
-  acceleration_.setZero();
+  for (SegmentScalars* v : {&rate_, &acceleration_, &jerk_}) v->setZero();
 }
 
 void ElongationReference::replace(double time_s, ReferenceSample& sample) const noexcept {
   const double ahead = time_s - time_s_;
   for (int i = 0; i < arm_.size(); ++i) {
-    sample.u[3 * i + 2] = e_[i] + ahead * (rate_[i] + 0.5 * ahead * acceleration_[i]);
-    sample.velocity[3 * i + 2] = rate_[i] + ahead * acceleration_[i];
-    sample.acceleration[3 * i + 2] = acceleration_[i];
+    const double gained = ahead * jerk_[i];
+    sample.u[3 * i + 2] =
+        e_[i] + ahead * (rate_[i] + ahead * (acceleration_[i] / 2.0 + gained / 6.0));
+    sample.velocity[3 * i + 2] = rate_[i] + ahead * (acceleration_[i] + 0.5 * gained);
+    sample.acceleration[3 * i + 2] = acceleration_[i] + gained;
   }
 }
 
-// force_ = N - I of the sample.
+// force_ = N - I of the sample; where `exact`, also how far N follows what is asked of it.
 void ElongationReference::force_beside_spring(double time_s, const ReferenceSample& sample,
-                                              const ModelCorrection* correction,
-                                              bool forces) noexcept {
+                                              const ModelCorrection* correction, bool forces,
+                                              bool exact) noexcept {
   sample_.u = sample.u;
   sample_.velocity = sample.velocity;
   sample_.acceleration = sample.acceleration;
   replace(time_s, sample_);
+  // Not that of the sample's time: the difference between samples would go round in a circle.
+  for (int i = 0; i < arm_.size(); ++i) sample_.acceleration[3 * i + 2] = acceleration_[i];
   inverse_dynamics(arm_, workspace_, sample_.u, sample_.velocity, sample_.velocity,
                    sample_.acceleration, {}, tau_);
   if (correction != nullptr) horizontal_.rows(sample_.u, workspace_, along_x_, along_y_);
@@ -105,8 +112,14 @@ void ElongationReference::force_beside_spring(double time_s, const ReferenceSamp
     const double wanted_n =
         beside_n + stiffness_[i] * sample.u[3 * i + 2] + damping_[i] * sample.velocity[3 * i + 2];
     // tau_A = A_chamber^-1 bend
-    const double chambers_n = allocator_.axial(i).within_reach(
-        {-bend.y(), bend.x()}, (wanted_n - unknown_n) / (1.0 + off.axial_gain));
+    const AxialChamberMap& chambers = allocator_.axial(i);
+    const AxialChamberMap::Torque moment{-bend.y(), bend.x()};
+    const double asked_n = (wanted_n - unknown_n) / (1.0 + off.axial_gain);
+    const double chambers_n = chambers.within_reach(moment, asked_n);
+    if (exact) {
+      const double step_n = chambers.smoothing_n();
+      follows_[i] = (chambers.within_reach(moment, asked_n + step_n) - chambers_n) / step_n;
+    }
     force_[i] = (1.0 + off.axial_gain) * chambers_n + unknown_n - beside_n;
   }
 }
@@ -131,7 +144,7 @@ void ElongationReference::advance(double time_s, double lookahead_s, ReferenceWi
   force_before_ = force_;
   force_beside_spring(after_s, window.after, correction, forces);
   force_after_ = force_;
-  force_beside_spring(time_s, window.now, correction, forces);
+  force_beside_spring(time_s, window.now, correction, forces, true);
   for (int i = 0; i < arm_.size(); ++i) {
     const SegmentParameters& segment = arm_.segments[static_cast<std::size_t>(i)];
     if (segment.constant_length) continue;
@@ -144,7 +157,14 @@ void ElongationReference::advance(double time_s, double lookahead_s, ReferenceWi
     const double then = now - slope * passed_s / stiffness;      // and was
     e_[i] = now + decay * (e_[i] - then);
     rate_[i] = (force_[i] - stiffness * e_[i]) / damping;
-    acceleration_[i] = (slope - stiffness * rate_[i]) / damping;
+    // Without inertia along e, which the chambers overcome where they give what is asked of them;
+    // where they do not, e'' lags by it (backward Euler).
+    const double light = (slope - stiffness * rate_[i]) / damping;
+    const double inertia_s = (1.0 - follows_[i]) * carried_kg_[i] / damping;
+    const double before = acceleration_[i];
+    acceleration_[i] =
+        passed_s > 0.0 ? light + inertia_s / (inertia_s + passed_s) * (before - light) : light;
+    jerk_[i] = passed_s > 0.0 ? (acceleration_[i] - before) / passed_s : 0.0;
   }
   time_s_ = time_s;
   replace(before_s, window.before);

@@ -116,6 +116,21 @@ bool decode(std::span<const std::byte> bytes, ObserverStatus& out) {
        report.correction);
   take(message.stiffness_deviation, message.damping_deviation, message.gain_deviation,
        message.load_deviation, message.disturbance_deviation_nm, report.deviation);
+  const auto take_axial = [](const auto& force_n, const auto& stiffness, const auto& damping,
+                             const auto& gain, ModelCorrection& into) {
+    for (std::size_t i = 0; i < force_n.size(); ++i) {
+      into.segment[i].axial_force_n = static_cast<double>(force_n[i]);
+      into.segment[i].axial_stiffness = static_cast<double>(stiffness[i]);
+      into.segment[i].axial_damping = static_cast<double>(damping[i]);
+      into.segment[i].axial_gain = static_cast<double>(gain[i]);
+    }
+  };
+  copy(message.elongation_m, report.elongation_m);
+  copy(message.elongation_deviation_m, report.elongation_deviation_m);
+  take_axial(message.axial_force_n, message.axial_stiffness, message.axial_damping,
+             message.axial_gain, report.correction);
+  take_axial(message.axial_force_deviation_n, message.axial_stiffness_deviation,
+             message.axial_damping_deviation, message.axial_gain_deviation, report.deviation);
   return true;
 }
 

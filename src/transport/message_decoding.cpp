@@ -158,8 +158,15 @@ bool decode(std::span<const std::byte> bytes, softarm_messages::timing_t& messag
 
 bool decode(std::span<const std::byte> bytes,
             softarm_messages::observer_status_t& message) noexcept {
-  constexpr std::size_t kBefore = 2 * 8 + 2 + 4 + 4 + 3 * 4 + 9 * 4, kSegment = 14 * 4;
-  return decode_list(bytes, kBefore, kSegment, kMaxSegments, message);
+  constexpr std::size_t kCounts = kHash + 2 * 8 + 2 + 4 + 4 + 3 * 4 + 9 * 4;
+  const int segments = bounded(length16_at(bytes, kCounts), kMaxSegments);
+  const int stretching = length16_at(bytes, kCounts + 2);
+  if (segments < 0 || !all_or_none(stretching, segments)) return false;
+  return decode_exactly(
+      bytes,
+      kCounts + 4 +
+          4 * (14 * static_cast<std::size_t>(segments) + 10 * static_cast<std::size_t>(stretching)),
+      message);
 }
 
 bool decode(std::span<const std::byte> bytes, softarm_messages::tick_record_t& message) noexcept {

@@ -44,6 +44,21 @@ void put_third(const SegmentVector& from, std::vector<float>& to) noexcept {
   }
 }
 
+/// Of every segment that stretches; nothing where the lists are empty.
+void put_axial(const SegmentScalars& e_m, const ModelCorrection& from, std::vector<float>& to_e_m,
+               std::vector<float>& force_n, std::vector<float>& stiffness,
+               std::vector<float>& damping, std::vector<float>& gain) noexcept {
+  for (std::size_t i = 0; i < to_e_m.size(); ++i) {
+    const auto k = static_cast<Eigen::Index>(i);
+    to_e_m[i] =
+        k < e_m.size() ? static_cast<float>(e_m[k]) : std::numeric_limits<float>::quiet_NaN();
+    force_n[i] = static_cast<float>(from.segment[i].axial_force_n);
+    stiffness[i] = static_cast<float>(from.segment[i].axial_stiffness);
+    damping[i] = static_cast<float>(from.segment[i].axial_damping);
+    gain[i] = static_cast<float>(from.segment[i].axial_gain);
+  }
+}
+
 }  // namespace
 
 std::int32_t counter(std::int64_t value) noexcept {
@@ -106,6 +121,14 @@ OutputMessages::OutputMessages(const PipelineSettings& settings, const Provenanc
   for (auto* pairs : {&observer.load, &observer.disturbance_nm, &observer.load_deviation,
                       &observer.disturbance_deviation_nm})
     pairs->assign(segments, std::vector<float>(2));
+  if (!settings.arm.extensible) return;
+  observer.num_stretching = status.num_segments;
+  for (auto* list :
+       {&observer.elongation_m, &observer.axial_force_n, &observer.axial_stiffness,
+        &observer.axial_damping, &observer.axial_gain, &observer.elongation_deviation_m,
+        &observer.axial_force_deviation_n, &observer.axial_stiffness_deviation,
+        &observer.axial_damping_deviation, &observer.axial_gain_deviation})
+    list->assign(segments, 0.0F);
 }
 
 void OutputMessages::set_command(std::int64_t tick, const TickOutput& output) noexcept {
@@ -210,6 +233,11 @@ bool OutputMessages::set_observer(std::int64_t tick, const ControlPipeline& pipe
       observer.disturbance_nm);
   put(report_.deviation, observer.stiffness_deviation, observer.damping_deviation,
       observer.gain_deviation, observer.load_deviation, observer.disturbance_deviation_nm);
+  put_axial(report_.elongation_m, report_.correction, observer.elongation_m, observer.axial_force_n,
+            observer.axial_stiffness, observer.axial_damping, observer.axial_gain);
+  put_axial(report_.elongation_deviation_m, report_.deviation, observer.elongation_deviation_m,
+            observer.axial_force_deviation_n, observer.axial_stiffness_deviation,
+            observer.axial_damping_deviation, observer.axial_gain_deviation);
   return true;
 }
 

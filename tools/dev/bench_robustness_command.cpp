@@ -19,7 +19,7 @@ namespace {
 struct RobustnessOptions {
   int seeds = 5;
   std::string scene, law;
-  bool json = false, processes = false;
+  bool json = false, processes = false, stretching = false;
   int draws = 0;
   std::uint64_t seed = 1, first = 1;
   double from_s = -1.0;  ///< negative: as the scene has it
@@ -37,6 +37,7 @@ void join(RobustnessTrial& worst, const RobustnessTrial& other) {
   larger(worst.u_rms_rad, other.u_rms_rad);
   larger(worst.u_largest_rad, other.u_largest_rad);
   larger(worst.tip_rms_m, other.tip_rms_m);
+  larger(worst.e_rms_m, other.e_rms_m);
   larger(worst.pressure_rate_bar_per_s, other.pressure_rate_bar_per_s);
   larger(worst.tick_us, other.tick_us);
   larger(worst.frame_tick_us, other.frame_tick_us);
@@ -56,16 +57,16 @@ void search(const RobustnessOptions& options) {
   std::fwrite(text.data(), 1, text.size(), stdout);
 }
 
-/// The law of the rows over LCM, if none is asked for.
+/// The law of the rows over LCM, and of arms that stretch, if none is asked for.
 bool is_asked(const RobustnessOptions& options, RobustnessLaw law) {
   if (!options.law.empty()) return options.law == name(law);
-  return !options.processes || law == RobustnessLaw::observer_parameters;
+  return !(options.processes || options.stretching) || law == RobustnessLaw::observer_parameters;
 }
 
 void measure_robustness(const RobustnessOptions& options) {
   std::vector<RobustnessRow> rows;
   const std::vector<ObserverCost> costs =
-      options.processes ? std::vector<ObserverCost>() : observer_costs();
+      options.processes || options.stretching ? std::vector<ObserverCost>() : observer_costs();
   const auto trial = [&](const Experiment& experiment, const RobustnessScene& scene, int seed) {
     const auto number = static_cast<std::uint64_t>(seed);
     return options.processes ? run_processes(experiment, scene, number)
@@ -80,7 +81,8 @@ void measure_robustness(const RobustnessOptions& options) {
       for (const RobustnessLaw law : kRobustnessLaws) {
         if (!is_asked(options, law)) continue;
         progress.update(scene.name + ": " + name(law));
-        const Experiment experiment = robustness_experiment(scene, law, shipped_config);
+        const Experiment experiment =
+            robustness_experiment(scene, law, shipped_config, options.stretching);
         RobustnessTrial worst = trial(experiment, scene, 1);
         for (int seed = 2; seed <= options.seeds; ++seed)
           join(worst, trial(experiment, scene, seed));
@@ -115,11 +117,17 @@ void add_bench_robustness_command(CLI::App& group) {
       "--processes", options->processes,
       "with softarmd and softarm-plant over LCM, in real time: one run of every scene, some 25 s "
       "each, with the observer and its parameters unless --law asks for another");
+  CLI::Option* stretching = command->add_flag(
+      "--stretching", options->stretching,
+      "the same arm with segments that stretch, as config/paper_arm_stretching.yaml: with the "
+      "observer and its parameters unless --law asks for another");
+  stretching->excludes(processes);
   command
       ->add_option("--draws", options->draws,
                    "instead: so many arms drawn at random, with the observer and its parameters")
       ->check(CLI::Range(1, 100'000))
-      ->excludes(processes);
+      ->excludes(processes)
+      ->excludes(stretching);
   command->add_option("--seed", options->seed, "of the arms drawn")->check(CLI::NonNegativeNumber);
   command->add_option("--first", options->first, "number of the first of the arms drawn")
       ->check(CLI::PositiveNumber)

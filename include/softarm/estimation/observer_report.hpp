@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 
+#include "softarm/model/coordinates.hpp"
 #include "softarm/model/model_correction.hpp"
 
 namespace softarm {
@@ -19,6 +20,9 @@ struct ObserverReport {
   double nis = 1.0;            ///< the newest innovation's square, a component; 1 on the average
   ModelCorrection correction;  ///< parameters and disturbance
   ModelCorrection deviation;   ///< their standard deviations
+  /// e of every segment at the newest frame (m), and its standard deviation; empty where segments
+  /// do not stretch, and the axial members of the corrections then are zero.
+  SegmentScalars elongation_m, elongation_deviation_m;
   /// A force on the end of the configured segment that the disturbance amounts to (N, world frame),
   /// and its covariance; zero where forces are not estimated.
   Eigen::Vector3d force_n = Eigen::Vector3d::Zero();

@@ -26,8 +26,9 @@ SegmentScalars straight_elongation(const ArmParameters& arm, const ActuationSett
 ///
 /// with e_w what is asked for, tau_ref what (17) asks for on the reference, I the e row of B u'' +
 /// C u' + G, and within_reach() as in AxialChamberMap: bending first, and smooth, so that N and with
-/// it the moment that e'' makes have no kinks where a pressure reaches zero. Inertia along e is left
-/// out of the left side: its rate is beta_a / m, thousands per second.
+/// it the moment that e'' makes have no kinks where a pressure reaches zero. Inertia along e is part
+/// of I, with the latest e''. Where bending decides about N, e'' follows the derivative of this with a
+/// lag of m / beta_a, some milliseconds, with m as if the straight arm's segments stretched alike.
 ///
 /// What is within reach is followed as asked (an initial difference fades with k_a / beta_a); where
 /// bending asks for more axial force than e_w does, the reference stretches as the arm will, so that
@@ -59,16 +60,19 @@ class ElongationReference {
 
  private:
   void force_beside_spring(double time_s, const ReferenceSample& sample,
-                           const ModelCorrection* correction, bool forces) noexcept;
+                           const ModelCorrection* correction, bool forces,
+                           bool exact = false) noexcept;
 
   ArmParameters arm_;
   const PressureAllocator& allocator_;
   DynamicsWorkspace workspace_;
   HorizontalLoad horizontal_;
   double time_s_ = 0.0;
-  SegmentScalars e_, rate_, acceleration_;             ///< at time_s_
+  SegmentScalars e_, rate_, acceleration_, jerk_;      ///< at time_s_
   SegmentScalars force_, force_before_, force_after_;  ///< N - I
+  SegmentScalars follows_;                             ///< dN / d(what is asked of N), 0 to 1
   SegmentScalars stiffness_, damping_;                 ///< k_a and beta_a, corrected
+  SegmentScalars carried_kg_;                          ///< m of the lag of e''
   ReferenceSample sample_;
   SegmentVector tau_, along_x_, along_y_;
   SegmentScalars bias_n_;

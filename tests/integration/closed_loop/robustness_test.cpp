@@ -17,8 +17,8 @@ Experiment shipped_experiment(const std::string& name) {
 }
 
 void holds(const RobustnessScene& scene, int seeds,
-           RobustnessLaw law = RobustnessLaw::observer_parameters) {
-  const Experiment experiment = robustness_experiment(scene, law, shipped_experiment);
+           RobustnessLaw law = RobustnessLaw::observer_parameters, bool stretches = false) {
+  const Experiment experiment = robustness_experiment(scene, law, shipped_experiment, stretches);
   for (int seed = 1; seed <= seeds; ++seed) {
     const RobustnessTrial trial = run(experiment, scene, static_cast<std::uint64_t>(seed));
     EXPECT_TRUE(trial.stayed_active) << scene.name << ", seed " << seed;
@@ -93,6 +93,11 @@ TEST(RobustnessSlow, EveryRowForFiveSeeds) {
 TEST(RobustnessSlow, EveryRowWithRepetitionForFiveSeeds) {
   for (const RobustnessScene& scene : robustness_scenes())
     if (scene.bound_mrad > 0.0) holds(scene, 5, RobustnessLaw::observer_repetition);
+}
+
+TEST(RobustnessSlow, EveryRowOnAnArmThatStretches) {
+  for (const RobustnessScene& scene : robustness_scenes())
+    if (scene.bound_mrad > 0.0) holds(scene, 1, RobustnessLaw::observer_parameters, true);
 }
 
 // With 110 to 150 g at the tip and 10 to 20 ms of dead time. Gains that may overshoot in the first

@@ -164,6 +164,16 @@ TEST(ModelObserver, FindsAxialStiffnessAndAreas) {
               4.0 * sigma.segment[k].axial_gain + 0.02);
     EXPECT_LT(std::abs(found[k].gain), 4.0 * sigma.segment[k].gain + 0.02) << "as modelled";
   }
+  ObserverReport report;
+  station.observer.report(report);
+  ASSERT_EQ(report.elongation_m.size(), 2);
+  for (int i = 0; i < 2; ++i) {
+    EXPECT_NEAR(report.elongation_m[i], station.truth.u[3 * i + 2], 5e-4);
+    EXPECT_GT(report.elongation_deviation_m[i], 0.0);
+    EXPECT_LT(report.elongation_deviation_m[i], 5e-4);
+    EXPECT_EQ(report.deviation.segment[static_cast<std::size_t>(i)].axial_gain,
+              sigma.segment[static_cast<std::size_t>(i)].axial_gain);
+  }
   double e = 0.0;
   station.each_tick = [&] {
     for (const int j : {2, 5})

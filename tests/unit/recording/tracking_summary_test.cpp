@@ -113,6 +113,36 @@ TEST(TrackingSummary, WhatIsNotKnownIsNullAndSaidSo) {
   EXPECT_NE(summary.table().find("the true state is not known"), std::string::npos);
 }
 
+TEST(TrackingSummary, WhatTheObserverLearntAlongSegmentsIsShownWithUnitsWhereTheyStretch) {
+  LogRow row = row_at(0.0, Mode::active);
+  row.observer.emplace();
+  row.observer->segments = 2;
+  row.observer->running = true;
+  row.observer->correction.disturbance_nm.setZero(4);
+  for (const bool stretches : {false, true}) {
+    if (stretches) {
+      row.observer->elongation_m = SegmentScalars::Constant(2, 0.0125);
+      row.observer->elongation_deviation_m = SegmentScalars::Constant(2, 0.0001);
+      row.observer->correction.segment[1].axial_stiffness = 0.2;
+      row.observer->correction.segment[1].axial_force_n = -1.5;
+      row.observer->deviation.segment[1].axial_gain = 0.03;
+    }
+    TrackingSummary summary(2, 0.0);
+    summary.add(row, kPeriod_s);
+    const nlohmann::json json = json_of(summary)["observer"];
+    EXPECT_EQ(json["correction"].contains("elongation_m"), stretches);
+    EXPECT_EQ(summary.table().find("elongation [mm]") != std::string::npos, stretches);
+    if (!stretches) continue;
+    EXPECT_EQ(json["correction"]["elongation_m"], (std::vector<double>{0.0125, 0.0125}));
+    EXPECT_EQ(json["correction"]["axial_stiffness"][1], 0.2);
+    EXPECT_EQ(json["correction"]["axial_force_n"][1], -1.5);
+    EXPECT_EQ(json["deviation"]["axial_gain"], (std::vector<double>{0.0, 0.03}));
+    EXPECT_NE(summary.table().find("+12.50 +- 0.10"), std::string::npos);
+    EXPECT_NE(summary.table().find("+20.0 +- 0.0"), std::string::npos);
+    EXPECT_NE(summary.table().find("-1.50 +- 0.00"), std::string::npos);
+  }
+}
+
 TEST(TrackingSummary, FramesAndMomentsAreReportedWhereThereAreAny) {
   TrackingSummary summary(2, 0.0);
   summary.commands_are_torques();

@@ -156,6 +156,51 @@ TEST(ElongationReference, BendingAsksForMoreAndGetsIt) {
   }
 }
 
+// Where bending decides about e its acceleration, which (17) feeds forward, is the second derivative of
+// e: inertia along e must not be left out of it.
+TEST(ElongationReference, AccelerationIsTheSecondDerivativeWhereBendingDecides) {
+  ArmParameters arm = stretching_arm(1);
+  arm.segments[0].mass_kg = 1.0;
+  const ActuationSettings actuation = four_chambers(1, 0.0);
+  const PressureAllocator allocator(actuation, true);
+  ElongationReference reference(arm, actuation, allocator);
+  constexpr double kTick_s = 0.001, kLookahead_s = 0.0025, kRate = 8.0;
+  reference.start(0.0, SegmentVector::Zero(3));
+  const auto sample_at = [](double t) {
+    ReferenceSample sample;
+    const double c = std::cos(kRate * t), s = std::sin(kRate * t);
+    sample.u = Eigen::Vector3d(0.4 * c, 0.3 * s, 0.0);
+    sample.velocity = Eigen::Vector3d(-0.4 * kRate * s, 0.3 * kRate * c, 0.0);
+    sample.acceleration = -kRate * kRate * sample.u;
+    return sample;
+  };
+  std::vector<double> e, velocity, acceleration;
+  for (int k = 1; k <= 2000; ++k) {
+    const double t = k * kTick_s;
+    ReferenceWindow window;
+    window.interval_s = 2.0 * kLookahead_s;
+    window.before = sample_at(t - kLookahead_s);
+    window.now = sample_at(t);
+    window.after = sample_at(t + kLookahead_s);
+    reference.advance(t, kLookahead_s, window);
+    e.push_back(window.now.u[2]);
+    velocity.push_back(window.now.velocity[2]);
+    acceleration.push_back(window.now.acceleration[2]);
+  }
+  double off = 0.0, all = 0.0, off_velocity = 0.0, all_velocity = 0.0;
+  for (std::size_t k = 1000; k + 1 < e.size(); ++k) {
+    const double second = (e[k + 1] - 2.0 * e[k] + e[k - 1]) / (kTick_s * kTick_s);
+    const double first = (e[k + 1] - e[k - 1]) / (2.0 * kTick_s);
+    off += (acceleration[k] - second) * (acceleration[k] - second);
+    all += second * second;
+    off_velocity += (velocity[k] - first) * (velocity[k] - first);
+    all_velocity += first * first;
+  }
+  EXPECT_GT(std::sqrt(all_velocity / 1000.0), 5e-3);
+  EXPECT_LT(std::sqrt(off_velocity / all_velocity), 0.01);
+  EXPECT_LT(std::sqrt(off / all), 0.08);
+}
+
 TEST(ElongationReference, SegmentsOfConstantLengthKeepItAndTheBias) {
   ArmParameters arm = stretching_arm(2);
   arm.segments[0].constant_length = true;

@@ -143,6 +143,43 @@ TEST(ArmMessages, AnObserverKeepsItsUnits) {
   EXPECT_EQ(report.deviation.disturbance_nm[0], 900.0);
 }
 
+TEST(ArmMessages, WhatAnObserverKnowsOfElongationsComesWhereSegmentsStretch) {
+  auto message = example<observer_status_t>(2, 4);
+  ObserverStatus observer;
+  observer.report.elongation_m = SegmentScalars::Constant(7, 9.0);  // of another arm, before
+  ASSERT_TRUE(decode(encoded(message), observer));
+  EXPECT_EQ(observer.report.elongation_m.size(), 0);
+  EXPECT_EQ(observer.report.correction.segment[1].axial_gain, 0.0);
+  const std::size_t without = encoded(message).size();
+  const auto stretching = [&](int count) {
+    message.num_stretching = static_cast<std::int16_t>(count);
+    double first = 1.0;
+    for (auto* list : {&message.elongation_m, &message.axial_force_n, &message.axial_stiffness,
+                       &message.axial_damping, &message.axial_gain, &message.elongation_deviation_m,
+                       &message.axial_force_deviation_n, &message.axial_stiffness_deviation,
+                       &message.axial_damping_deviation, &message.axial_gain_deviation})
+      *list = test::numbers<float>(count, first++);
+    return encoded(message);
+  };
+  ASSERT_TRUE(decode(stretching(2), observer));
+  EXPECT_EQ(encoded(message).size(), without + 80);
+  const ObserverReport& report = observer.report;
+  EXPECT_EQ(report.elongation_m, (SegmentScalars(2) << 1.0, 1.25).finished());
+  EXPECT_EQ(report.elongation_deviation_m, (SegmentScalars(2) << 6.0, 6.25).finished());
+  const SegmentCorrection& is = report.correction.segment[1];
+  const SegmentCorrection& sigma = report.deviation.segment[1];
+  EXPECT_EQ(is.axial_force_n, 2.25);
+  EXPECT_EQ(is.axial_stiffness, 3.25);
+  EXPECT_EQ(is.axial_damping, 4.25);
+  EXPECT_EQ(is.axial_gain, 5.25);
+  EXPECT_EQ(is.stiffness, 1.25);
+  EXPECT_EQ(sigma.axial_force_n, 7.25);
+  EXPECT_EQ(sigma.axial_stiffness, 8.25);
+  EXPECT_EQ(sigma.axial_damping, 9.25);
+  EXPECT_EQ(sigma.axial_gain, 10.25);
+  for (const int wrong : {1, 3}) EXPECT_FALSE(decode(stretching(wrong), observer)) << wrong;
+}
+
 TEST(ArmMessages, MayPressuriseWhereItIsArmedOrHolds) {
   for (const Mode mode :
        {Mode::init, Mode::wait_frames, Mode::active, Mode::hold, Mode::vent, Mode::fault})

@@ -36,7 +36,7 @@ std::vector<LengthField> length_fields(const torque_command_t&) { return {{29, 2
 std::vector<LengthField> length_fields(const pressure_measurement_t&) { return {{33, 2}}; }
 std::vector<LengthField> length_fields(const curvature_reference_t&) { return {{16, 2}}; }
 std::vector<LengthField> length_fields(const valves_status_t&) { return {{64, 2}}; }
-std::vector<LengthField> length_fields(const observer_status_t&) { return {{82, 2}}; }
+std::vector<LengthField> length_fields(const observer_status_t&) { return {{82, 2}, {84, 2}}; }
 std::vector<LengthField> length_fields(const plant_state_t&) { return {{17, 2}, {19, 2}}; }
 std::vector<LengthField> length_fields(const law_state_t&) { return {{41, 2}, {43, 2}}; }
 std::vector<LengthField> length_fields(const law_command_t&) { return {{29, 2}}; }

@@ -42,14 +42,15 @@ std::string table(const std::vector<RobustnessRow>& rows, const std::vector<Obse
   });
   if (at == cells.end()) --at;
   const auto detailed = static_cast<std::size_t>(at - cells.begin());
-  text += fmt::format("\n{}:\n{:<36}{:>10}{:>10}{:>10}{:>10}{:>10}{:>8}{:>10}\n", name(at->law), "",
-                      "largest", "tip", "pressure", "tick", "frame", "NIS", "surprised");
-  text += fmt::format("{:<36}{:>10}{:>10}{:>10}{:>10}{:>10}{:>8}{:>10}\n", "", "[mrad]", "[mm]",
-                      "[bar/s]", "[us]", "[us]", "", "[%]");
+  text +=
+      fmt::format("\n{}:\n{:<36}{:>10}{:>10}{:>10}{:>10}{:>10}{:>10}{:>8}{:>10}\n", name(at->law),
+                  "", "largest", "tip", "e", "pressure", "tick", "frame", "NIS", "surprised");
+  text += fmt::format("{:<36}{:>10}{:>10}{:>10}{:>10}{:>10}{:>10}{:>8}{:>10}\n", "", "[mrad]",
+                      "[mm]", "[mm]", "[bar/s]", "[us]", "[us]", "", "[%]");
   for (const RobustnessRow& row : rows) {
     const RobustnessTrial& trial = row.cells[detailed].worst;
-    text += fmt::format("{:<36}{:>10.3g}{:>10.3g}{}{}{}{:>8.3f}{:>10.2g}\n", row.scene,
-                        1e3 * trial.u_largest_rad, 1e3 * trial.tip_rms_m,
+    text += fmt::format("{:<36}{:>10.3g}{:>10.3g}{:>10.3g}{}{}{}{:>8.3f}{:>10.2g}\n", row.scene,
+                        1e3 * trial.u_largest_rad, 1e3 * trial.tip_rms_m, 1e3 * trial.e_rms_m,
                         column(trial.pressure_rate_bar_per_s, 0), column(trial.tick_us, 1),
                         column(trial.frame_tick_us, 1), trial.nis, 100.0 * trial.surprised);
   }
@@ -72,6 +73,7 @@ std::string json(const std::vector<RobustnessRow>& rows, const std::vector<Obser
                       {"u_rms_rad", trial.u_rms_rad},
                       {"u_largest_rad", trial.u_largest_rad},
                       {"tip_rms_m", trial.tip_rms_m},
+                      {"e_rms_m", trial.e_rms_m},
                       {"pressure_rate_bar_per_s", trial.pressure_rate_bar_per_s},
                       {"tick_us", trial.tick_us},
                       {"frame_tick_us", trial.frame_tick_us},

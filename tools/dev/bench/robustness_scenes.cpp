@@ -90,6 +90,18 @@ void held(Experiment& e) {
   e.reference.phases = {{pose, 0.0}};
 }
 
+void let_stretch(Experiment& e, const Experiment& stretching) {
+  for (ArmParameters* arm : {&e.arm, &e.plant.arm}) {
+    arm->extensible = true;
+    for (std::size_t i = 0; i < arm->segments.size(); ++i) {
+      const SegmentParameters& from = stretching.arm.segments.at(i);
+      arm->segments[i].axial_stiffness_n_per_m = from.axial_stiffness_n_per_m;
+      arm->segments[i].axial_damping_ns_per_m = from.axial_damping_ns_per_m;
+    }
+  }
+  e.actuation.bias_pressure_bar = stretching.actuation.bias_pressure_bar;
+}
+
 }  // namespace
 
 std::vector<RobustnessScene> robustness_scenes() {
@@ -170,8 +182,10 @@ const char* name(RobustnessLaw law) {
 }
 
 Experiment robustness_experiment(const RobustnessScene& scene, RobustnessLaw law,
-                                 const std::function<Experiment(const std::string&)>& config) {
+                                 const std::function<Experiment(const std::string&)>& config,
+                                 bool stretches) {
   Experiment e = config(scene.nominal ? "paper_arm_nominal.yaml" : "paper_arm.yaml");
+  if (stretches) let_stretch(e, config("paper_arm_stretching.yaml"));
   switch (law) {
     case RobustnessLaw::paper17:
       break;

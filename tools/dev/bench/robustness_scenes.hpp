@@ -48,14 +48,17 @@ inline constexpr RobustnessLaw kRobustnessLaws[] = {RobustnessLaw::paper17,
 const char* name(RobustnessLaw law);
 
 /// `config(name)` loads an experiment that comes with softarm.
+/// @param stretches the segments, as those of paper_arm_stretching.yaml
 Experiment robustness_experiment(const RobustnessScene& scene, RobustnessLaw law,
-                                 const std::function<Experiment(const std::string&)>& config);
+                                 const std::function<Experiment(const std::string&)>& config,
+                                 bool stretches = false);
 
 /// How a run went. Errors are reference minus the arm's true u, a component; NaN where the arm was
 /// not ACTIVE.
 struct RobustnessTrial {
   double u_rms_rad = 0.0, u_largest_rad = 0.0;
   double tip_rms_m = 0.0;                ///< from where the tip would be at u_ref on a PCC arm
+  double e_rms_m = 0.0;                  ///< of all segments; zero where they do not stretch
   double pressure_rate_bar_per_s = 0.0;  ///< RMS of all commanded pressures
   /// Wall clock of a tick: its median, and 90 % of all, which is one with a frame.
   double tick_us = 0.0, frame_tick_us = 0.0;

@@ -6,6 +6,7 @@
 #include "softarm/base/clock.hpp"
 #include "softarm/base/time.hpp"
 #include "softarm/estimation/model_observer.hpp"
+#include "softarm/model/coordinates.hpp"
 #include "softarm/model/kinematics.hpp"
 #include "softarm/runtime/control_pipeline.hpp"
 #include "softarm/simulation/simulated_arm.hpp"
@@ -42,7 +43,7 @@ RobustnessTrial run(const Experiment& asked, const RobustnessScene& scene, std::
   PressureVector measured, before;
   std::vector<std::int64_t> ticks_ns;
   RobustnessTrial trial;
-  double u_squares = 0.0, tip_squares = 0.0, rate_squares = 0.0, nis = 0.0;
+  double u_squares = 0.0, tip_squares = 0.0, e_squares = 0.0, rate_squares = 0.0, nis = 0.0;
   std::int64_t counted = 0, surprised = 0, active_since_ns = -1;
   const double until_s = scene.counted_from_s + scene.counted_s;
   constexpr std::int64_t kPatience_ns = 10'000'000'000;
@@ -72,11 +73,16 @@ RobustnessTrial run(const Experiment& asked, const RobustnessScene& scene, std::
     if (active_since_ns < 0) active_since_ns = now_ns;
     if (to_seconds(now_ns - active_since_ns) < scene.counted_from_s) continue;
     arm.advance_to(now_ns + period_ns / 2);
-    const SegmentVector error = output.reference.u - arm.plant().u_rad();
+    const SegmentVector u_rad = arm.plant().u_rad();
+    const SegmentScalars e_m = arm.plant().elongation_m();
+    const SegmentVector error = bend_part(e.arm, output.reference.u) - u_rad;
     u_squares += error.squaredNorm() / static_cast<double>(error.size());
     trial.u_largest_rad = std::max(trial.u_largest_rad, error.cwiseAbs().maxCoeff());
     const Eigen::Vector3d tip_ref = tip_position(e.arm, output.reference.u);
-    tip_squares += (tip_position(e.arm, arm.plant().u_rad()) - tip_ref).squaredNorm();
+    tip_squares += (tip_position(e.arm, coordinates(e.arm, u_rad, e_m)) - tip_ref).squaredNorm();
+    if (e.arm.extensible)
+      e_squares += (stretch_part(e.arm, output.reference.u) - e_m).squaredNorm() /
+                   static_cast<double>(e_m.size());
     rate_squares += ((output.pressure_bar - before) * e.rate_hz).squaredNorm() /
                     static_cast<double>(before.size());
     if (output.observer != nullptr) {
@@ -89,6 +95,7 @@ RobustnessTrial run(const Experiment& asked, const RobustnessScene& scene, std::
   const double count = static_cast<double>(counted);
   trial.u_rms_rad = std::sqrt(u_squares / count);
   trial.tip_rms_m = std::sqrt(tip_squares / count);
+  trial.e_rms_m = std::sqrt(e_squares / count);
   trial.pressure_rate_bar_per_s = std::sqrt(rate_squares / count);
   trial.nis = nis / count;
   trial.surprised = static_cast<double>(surprised) / count;
