@@ -4,19 +4,6 @@
 #include <cmath>
 
 namespace softarm {
-namespace {
-
-/// Largest difference of any parameter; disturbances and forces are none.
-double largest_change(const SegmentCorrection& a, const SegmentCorrection& b) noexcept {
-  return std::max({std::abs(a.stiffness - b.stiffness), std::abs(a.damping - b.damping),
-                   std::abs(a.gain - b.gain), (a.load - b.load).cwiseAbs().maxCoeff(),
-                   std::abs(a.axial_stiffness - b.axial_stiffness),
-                   std::abs(a.axial_damping - b.axial_damping),
-                   std::abs(a.axial_gain - b.axial_gain)});
-}
-
-}  // namespace
-
 RepetitiveCompensation::RepetitiveCompensation(const ArmParameters& arm, double lead_s,
                                                double step_s)
     : step_s_(step_s),
@@ -41,7 +28,6 @@ void RepetitiveCompensation::start(double period_s) noexcept {
   period_s_ = period_s;
   table_.setZero();
   in_row_ = 0;
-  looked_ = settled_ = false;
 }
 
 RepetitiveCompensation::Place RepetitiveCompensation::place(double time_s) const noexcept {
@@ -51,25 +37,9 @@ RepetitiveCompensation::Place RepetitiveCompensation::place(double time_s) const
   return {before, (before + 1) % kNodes, at - before};
 }
 
-void RepetitiveCompensation::judge(double time_s, const ModelCorrection& found) noexcept {
-  if (looked_ && time_s < looked_s_ + std::max(period_s_, kSettling_s)) return;
-  double change = 0.0;
-  for (std::size_t i = 0; i < static_cast<std::size_t>(segments_); ++i) {
-    change = std::max(change, largest_change(found.segment[i], earlier_.segment[i]));
-    earlier_.segment[i] = found.segment[i];
-  }
-  settled_ = looked_ && change <= kSettled;
-  looked_ = true;
-  looked_s_ = time_s;
-}
-
 /// The table at `time_s` follows what became of d since then.
 void RepetitiveCompensation::follow(double time_s) noexcept {
-  if (settled_) {
-    target_ = now_ - seen_.col(next_);
-  } else {
-    target_.setZero();
-  }
+  target_ = now_ - seen_.col(next_);
   const Place then = place(time_s);
   // Two parts of kNodes pass a node, with half the weight on the average.
   const double passed = std::min(1.0, kGain * kNodes * step_s_ / period_s_);
@@ -79,13 +49,13 @@ void RepetitiveCompensation::follow(double time_s) noexcept {
 
 void RepetitiveCompensation::advance(double time_s, bool learn, ModelCorrection& found) noexcept {
   if (!(period_s_ > 0.0)) return;
-  judge(time_s, found);
   const int width = stretches_ ? 3 : 2;
   for (int i = 0; i < segments_; ++i) {
     now_.segment<2>(width * i) = found.disturbance_nm.segment<2>(2 * i);
     if (stretches_) now_[3 * i + 2] = found.segment[static_cast<std::size_t>(i)].axial_force_n;
   }
-  if (learn && in_row_ == ticks_) follow(time_s - static_cast<double>(ticks_) * step_s_);
+  const double then_s = time_s - static_cast<double>(ticks_) * step_s_;
+  if (learn && in_row_ == ticks_ && then_s >= period_s_) follow(then_s);
   in_row_ = learn ? std::min(in_row_ + 1, ticks_) : 0;
   seen_.col(next_) = now_;
   next_ = (next_ + 1) % ticks_;

@@ -337,7 +337,11 @@ const ModelCorrection* ControlPipeline::correction() noexcept {
 /// With what repeats along the reference, as far ahead as is configured.
 const ModelCorrection* ControlPipeline::ahead(const ModelCorrection* found,
                                               std::int64_t at_ns) noexcept {
-  if (!repetition_ || found == nullptr) return found;
+  if (!repetition_) return found;
+  if (found == nullptr) {  // the observer starts again, and so does this
+    repeating_phase_ = -1;
+    return nullptr;
+  }
   const Reference::Place place = reference_.place(seconds(at_ns));
   if (place.phase != repeating_phase_)
     repetition_->start(periods_s_[static_cast<std::size_t>(place.phase)]);

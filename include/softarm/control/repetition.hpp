@@ -22,9 +22,8 @@ namespace softarm {
 /// is at most 1). w of a period follows from the periods before it: within one it is a force known
 /// beforehand, which changes no margin of the loop.
 ///
-/// Nothing is learnt before the parameters have settled: until then d has what they lack, and the
-/// table fades. |w| is at most kLargest times the torque that bends the segment by 1 rad (along e:
-/// times sqrt(k k_a)).
+/// Nothing is learnt in the first period, in which the reference is joined. |w| is at most kLargest
+/// times the torque that bends the segment by 1 rad (along e: times sqrt(k k_a)).
 ///
 /// Iterative learning along the phase (Bristow, Tharayil, Alleyne, IEEE Control Systems 26(3), 2006)
 /// with the disturbance observer's estimate in place of the error, and a lead for its lag (Longman,
@@ -34,9 +33,6 @@ class RepetitiveCompensation {
   static constexpr int kNodes = 64;        ///< of a period
   static constexpr double kGain = 0.3;     ///< of what is seen, a period
   static constexpr double kLargest = 0.1;  ///< of w
-  /// Largest change of a parameter, over a period or this time if that is longer, of an arm that has
-  /// settled.
-  static constexpr double kSettled = 0.05, kSettling_s = 2.0;
 
   /// `step_s` from tick to tick. Does nothing before start().
   RepetitiveCompensation(const ArmParameters& arm, double lead_s, double step_s);
@@ -55,7 +51,6 @@ class RepetitiveCompensation {
     double part;        ///< of the way from the one to the other
   };
   Place place(double time_s) const noexcept;
-  void judge(double time_s, const ModelCorrection& found) noexcept;
   void follow(double time_s) noexcept;
 
   double step_s_;
@@ -68,9 +63,6 @@ class RepetitiveCompensation {
   Eigen::MatrixXd seen_;                  ///< d of the last ticks_, a column each
   Eigen::Index next_ = 0;                 ///< the oldest of these, and where the next one goes
   Eigen::Index in_row_ = 0;               ///< ticks that count, up to ticks_
-  ModelCorrection earlier_;               ///< its parameters, when they were last looked at
-  double looked_s_ = 0.0;
-  bool looked_ = false, settled_ = false;
 };
 
 }  // namespace softarm

@@ -132,7 +132,7 @@ TEST(LearnedArm, ATiltIsKnownFromTheBeginning) {
   again.arm = learned.arm;
   again.actuation = learned.actuation;
   again.estimation.model_observer = known;
-  EXPECT_LT(error_rad(again), 0.5 * before_rad);
+  EXPECT_LT(error_rad(again), 0.9 * before_rad);
 }
 
 /// Pushed from 10 s on.

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 
 #include "dev/bench/robustness_draws.hpp"
@@ -81,7 +82,8 @@ TEST(RobustnessSlow, RepetitionFadesABlowWithMomentsThatAreOff) {
     }
     EXPECT_EQ(calm_steps.pipeline().output().mode, Mode::active);
     EXPECT_GT(early, 1e-3) << factor;
-    EXPECT_LT(late, 0.02 * early) << factor;
+    // 0.3 may have been learnt of it, of which 0.7 is left after each of four periods.
+    EXPECT_LT(late, 0.3 * std::pow(0.7, 4) * early) << factor;
   }
 }
 

@@ -137,25 +137,14 @@ TEST(Repetition, StartForgets) {
   while (seen.t_s < 5.0 * kPeriod_s) EXPECT_EQ(seen.tick(repeating_nm(seen.t_s)), 0.0);
 }
 
-TEST(Repetition, NothingIsLearntWhileItMayNotOrParametersMove) {
-  Seen pushed;
-  pushed.periods(
+TEST(Repetition, NothingIsLearntOfWhatDoesNotCount) {
+  Seen seen;
+  seen.periods(
       10, [](double t_s) { return repeating_nm(t_s); }, false);
-  EXPECT_EQ(pushed.tick(0.0, false), 0.0);
-
-  Seen moving;
-  for (const double end_s = 10.0 * kPeriod_s; moving.t_s < end_s;) {
-    moving.found.segment[1].load.x() = 0.03 * moving.t_s;  // 0.09 a period
-    EXPECT_EQ(moving.tick(repeating_nm(moving.t_s)), 0.0);
-  }
-  // Settled, it is learnt; and forgotten where they move again.
-  moving.periods(10, [](double t_s) { return repeating_nm(t_s); });
-  EXPECT_GT(std::abs(moving.tick(0.0)), 1e-3);
-  for (const double end_s = moving.t_s + 40.0 * kPeriod_s; moving.t_s < end_s;) {
-    moving.found.segment[1].load.x() = 0.03 * moving.t_s;
-    moving.tick(repeating_nm(moving.t_s));
-  }
-  EXPECT_LT(std::abs(moving.tick(0.0)), 1e-5);
+  EXPECT_EQ(seen.tick(0.0, false), 0.0);
+  // Nor of the time across it: one tick in each lead is enough.
+  for (int k = 0; seen.t_s < 20.0 * kPeriod_s; ++k)
+    EXPECT_EQ(seen.tick(repeating_nm(seen.t_s), k % 50 != 0), 0.0);
 }
 
 /// Largest w after 150 periods of a harmonic of `size_nm` at which w is twice the table, the most it

@@ -10,8 +10,9 @@
 namespace softarm {
 
 /// The experiment's arm and chambers with the observer's corrections of stiffness, damping and gain,
-/// and its horizontal load (a tilt, a payload, a force on the tip) as what the observer starts from,
-/// with the largest of its standard deviations.
+/// and its horizontal load (a tilt, a payload, a force on the tip) as what the observer starts from.
+/// That is the load learnt and, as it is learnt slowly, what the disturbance of this instant amounts to
+/// on the straight arm; the deviation is the largest of both together.
 Experiment corrected(const Experiment& experiment, const ObserverReport& learned);
 
 /// An experiment that includes `config`, with what was learnt in place of the configured values; the
