@@ -107,16 +107,6 @@ class Selection {
     return out;
   }
 
-  /// What was chosen, identified from other frames of the same records.
-  void identify_again(std::span<const MotionRecord> records, const std::vector<Fold>& folds,
-                      SelectedModel& out) const {
-    const ParameterSet set(start_, kind_, out.choice);
-    for (std::size_t i = 0; i < folds.size(); ++i)
-      out.by_fold[i] = set.arm(find(set, folds[i].seen, out.prior, {out.by_fold[i]}).x);
-    out.whole = find(set, records, out.prior, {out.arm});
-    out.arm = set.arm(out.whole.x);
-  }
-
  private:
   bool applies(const Term& term, const FitChoice& choice) const {
     if (choice.*term.flag) return false;
@@ -293,10 +283,7 @@ SelectedModel select_terms(const ArmHypothesis& start, ActuationKind kind, const
     few_folds.push_back({{}, thinned(fold.unseen)});
     for (const MotionRecord& each : fold.seen) few_folds.back().seen.push_back(thinned(each));
   }
-  Selection selection(start, kind, few, few_folds, options);
-  SelectedModel out = selection.run(plain);
-  selection.identify_again(records, folds, out);
-  return out;
+  return Selection(start, kind, few, few_folds, options).run(plain);
 }
 
 std::string selection_text(const SelectedModel& model, double motion, double unit,

@@ -48,7 +48,7 @@ struct SelectionOptions {
   IdentifyOptions identify;
   double least_gain = 0.01;  ///< relative, of the error on what was not seen; less is no gain
   /// Without inertia, frames so far apart are searched with, and measured pressures are averaged over
-  /// half of it: a tenth of the shortest lag of such arms. What was chosen is identified from all.
+  /// half of it: a tenth of the shortest lag of such arms.
   double apart_s = 0.1;
   std::function<void(const std::string&)> progress;  ///< may be empty
 };
