@@ -14,9 +14,17 @@ namespace {
 
 constexpr double kMove_s = 2.0, kHold_s = 1.0;  ///< of a first bend
 
+std::filesystem::path journal_file(const std::filesystem::path& folder) {
+  return folder / "journal.txt";
+}
+
 }  // namespace
 
-Journal::Journal(const std::filesystem::path& folder) : file_(folder / "journal.txt") {
+bool Journal::is_in(const std::filesystem::path& folder) {
+  return std::filesystem::exists(journal_file(folder));
+}
+
+Journal::Journal(const std::filesystem::path& folder) : file_(journal_file(folder)) {
   std::error_code error;
   std::filesystem::create_directories(folder, error);
   if (error) throw OutputError(fmt::format("{}: {}", folder.string(), error.message()));

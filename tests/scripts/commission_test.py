@@ -42,6 +42,15 @@ class Commission(unittest.TestCase):
         self.assertEqual(without_an_arm.returncode, 64, without_an_arm.stderr)
         self.assertIn("a real one moves only when somebody who sees it agrees", without_an_arm.stderr)
         self.assertFalse(self.out.exists())
+        # An experiment of the same name as one that is found stays what it is.
+        self.out.mkdir()
+        mine = self.out / "bend.yaml"
+        mine.write_text("mine", encoding="utf-8")
+        refused = self.commission(answers="n\n")
+        self.assertEqual(refused.returncode, 64, refused.stdout)
+        self.assertIn(f"{mine} is not from softarm commission: another --out, please", refused.stderr)
+        self.assertEqual([path.name for path in self.out.iterdir()], ["bend.yaml"])
+        mine.unlink()
         start(self, self.folder, PROGRAMS / "softarm-plant", "--modbus", self.port, self.config)
         # Nobody agrees: nothing is commanded.
         asked = self.commission(answers="y\nn\n")

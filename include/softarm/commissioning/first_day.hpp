@@ -26,6 +26,9 @@ class Journal {
   /// Reads what is there; a line that is none is left out. @throws OutputError without a folder
   explicit Journal(const std::filesystem::path& folder);
 
+  /// Whether a step has been done in this folder.
+  static bool is_in(const std::filesystem::path& folder);
+
   /// What the step found with this experiment; nullptr if it has not been done.
   const Entry* find(std::string_view step, std::uint64_t experiment) const;
   /// Notes a step and forgets those that were noted after it. @throws OutputError

@@ -32,6 +32,15 @@ bool is_simulated(const Experiment& experiment) {
   return client.wait_for([&] { return client.plant().has_value(); }, kPlant_s);
 }
 
+/// What a step would write over in a folder where nothing has been done yet: somebody else's.
+std::filesystem::path foreign_file(const CommissionSettings& settings) {
+  if (!Journal::is_in(settings.folder))
+    for (const auto& file : {settings.calibrated(), settings.identified(), settings.motion("bend"),
+                             settings.motion("track")})
+      if (std::filesystem::exists(file)) return file;
+  return {};
+}
+
 /// Asks before a step; without a terminal the answer is no.
 bool agreed(const CommissionStep& step, bool yes) {
   if (yes) return true;
@@ -59,6 +68,11 @@ std::string report(const CommissionSettings& settings, const Journal& journal) {
 int commission(const CommissionOptions& options) {
   const CommissionSettings& settings = options.settings;
   const Experiment experiment = load_experiment(settings.config);
+  if (const auto file = foreign_file(settings); !file.empty()) {
+    print_error("softarm", fmt::format("{} is not from softarm commission: another --out, please",
+                                       file.string()));
+    return kExitUsage;
+  }
   if (options.yes && !is_simulated(experiment)) {
     print_error("softarm",
                 fmt::format("--yes is for a simulated arm; none is heard on {}: a real one moves "

@@ -110,7 +110,7 @@ StepOutcome identify_arm(const CommissionSettings& settings) {
 
 StepOutcome follow(const CommissionSettings& settings, const char* name, double bend_rad,
                    double duration_s, const std::string& text) {
-  const fs::path file = settings.folder / fmt::format("{}.yaml", name);
+  const fs::path file = settings.motion(name);
   write_experiment(file, load_experiment(settings.identified()), text);
   const fs::path folder = settings.folder / name;
   const ClosedLoopRun run = run_closed_loop(file, folder, duration_s);

@@ -24,6 +24,8 @@ struct CommissionSettings {
 
   std::filesystem::path calibrated() const { return folder / "calibrated.yaml"; }
   std::filesystem::path identified() const { return folder / "identified.yaml"; }
+  /// Of a motion, "bend" or "track".
+  std::filesystem::path motion(const std::string& name) const { return folder / (name + ".yaml"); }
 };
 
 struct CommissionStep {
