@@ -120,9 +120,6 @@ ModelObserver::State::State(const ArmParameters& arm_, const EstimationSettings&
   const double load_deviation = settings.load_deviation.value_or(0.0);
   require(load_deviation >= 0.0, "load_deviation >= 0", load_deviation);
   const int n = arm.size();
-  if (!settings.load.empty() && settings.load.size() != static_cast<std::size_t>(2 * n))
-    throw std::invalid_argument(fmt::format("observer: expected a load of {} numbers, got {}",
-                                            2 * n, settings.load.size()));
   if (arm_.extensible) {
     whole = arm_;
     axial = std::make_unique<AxialObserver>(arm_, settings, history.size(), timing.valve_lag_s);
@@ -151,7 +148,8 @@ void ModelObserver::State::fail() noexcept {
 void ModelObserver::State::forget_parameters() noexcept {
   for (Parameters& shown : information) shown.setZero();
   correction.segment.fill({});
-  for (std::size_t i = 0; 2 * i + 1 < settings.load.size(); ++i)
+  const auto known = std::min(settings.load.size() / 2, static_cast<std::size_t>(arm.size()));
+  for (std::size_t i = 0; i < known; ++i)
     correction.segment[i].load = {settings.load[2 * i], settings.load[2 * i + 1]};
   correction.disturbance_nm.setZero(arm.dof());
   if (axial) axial->forget_parameters();

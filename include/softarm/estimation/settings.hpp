@@ -26,7 +26,7 @@ struct ModelObserverSettings {
   double parameter_deviation = 0.2;
   double payload_deviation = 0.0;
   /// Horizontal load of every segment before anything was learnt, two numbers each (see
-  /// SegmentCorrection); empty: zero. And its standard deviation; none: parameter_deviation.
+  /// SegmentCorrection); zero where there are fewer. And its standard deviation; none: parameter_deviation.
   std::vector<double> load;
   std::optional<double> load_deviation;
   double parameter_drift_per_sqrt_s = 5e-4;
