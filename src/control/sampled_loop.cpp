@@ -1,6 +1,7 @@
 #include "control/sampled_loop.hpp"
 
-#include <Eigen/Dense>
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -8,6 +9,8 @@
 #include <limits>
 #include <unsupported/Eigen/MatrixFunctions>
 #include <vector>
+
+#include "softarm/model/modes.hpp"
 
 namespace softarm {
 namespace {
@@ -185,9 +188,9 @@ BendingPlane reduced(const BendingPlane& plane, int modes) {
   const MatrixXd inertia = plane.inverse_inertia.llt().solve(
       MatrixXd::Identity(plane.stiffness.rows(), plane.stiffness.cols()));
   const MatrixXd stiffness = plane.stiffness + plane.gravity_slope;
-  const Eigen::GeneralizedSelfAdjointEigenSolver<MatrixXd> eigen(stiffness, inertia);
+  const MatrixXd shapes = symmetric_modes(stiffness, inertia).vectors;
   MatrixXd V(stiffness.rows(), modes);
-  V << eigen.eigenvectors().leftCols(modes / 2), eigen.eigenvectors().rightCols(modes - modes / 2);
+  V << shapes.leftCols(modes / 2), shapes.rightCols(modes - modes / 2);
   const auto part = [&](const MatrixXd& matrix) { return MatrixXd(V.transpose() * matrix * V); };
   return {MatrixXd::Identity(modes, modes),
           part(plane.gravity_slope),

@@ -83,7 +83,7 @@ function(softarm_tests label module)
   set(target ${label}_${module}_tests)
   add_executable(${target} ${sources})
   target_include_directories(${target} PRIVATE ${PROJECT_SOURCE_DIR}/src ${PROJECT_SOURCE_DIR}/tools ${PROJECT_SOURCE_DIR}/tests)
-  target_link_libraries(${target} PRIVATE ${TESTS_DEPENDS} GTest::gtest_main softarm_options)
+  target_link_libraries(${target} PRIVATE ${TESTS_DEPENDS} softarm_test_support GTest::gtest_main softarm_options)
   target_compile_definitions(${target} PRIVATE
     SOFTARM_SOURCE_DIR="${PROJECT_SOURCE_DIR}" SOFTARM_BINARY_DIR="${PROJECT_BINARY_DIR}")
   if(TESTS_COMPUTES)

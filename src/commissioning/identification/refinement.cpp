@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -12,6 +11,7 @@
 
 #include "commissioning/identification/parallel.hpp"
 #include "commissioning/identification/serial_correlation.hpp"
+#include "softarm/model/modes.hpp"
 
 namespace softarm {
 namespace {
@@ -203,9 +203,9 @@ class Search {
     Eigen::MatrixXd information = J.transpose() * J / inflation_;
     if (options_.prior > 0.0)
       information.diagonal().array() += 1.0 / (options_.prior * options_.prior);
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(information);
-    out.singular_values = eigen.eigenvalues().reverse().cwiseMax(0.0).cwiseSqrt();
-    out.combinations = eigen.eigenvectors().rowwise().reverse();
+    const Modes modes = symmetric_modes(information);
+    out.singular_values = modes.values.reverse().cwiseMax(0.0).cwiseSqrt();
+    out.combinations = modes.vectors.rowwise().reverse();
     out.held = static_cast<int>((out.singular_values.array() < 1.0 / kHeldAbove).count());
     if (options_.prior > 0.0) out.held = 0;
   }
@@ -304,8 +304,9 @@ class Search {
     const Eigen::VectorXd inverse = out.singular_values.head(kept).array().square().inverse();
     const double samples = static_cast<double>(frames * dof);
     const double freedom = std::max(1.0, samples / inflation_ - static_cast<double>(kept));
-    out.covariance = samples / (samples - static_cast<double>(kept)) * part * inverse.asDiagonal() *
-                     inner * inverse.asDiagonal() * part.transpose();
+    const Eigen::MatrixXd spread = part * inverse.asDiagonal();
+    out.covariance = spread * inner * spread.transpose();
+    out.covariance *= samples / (samples - static_cast<double>(kept));
     out.quantile = student_975(freedom);
     out.inflation = inflation_;
   }

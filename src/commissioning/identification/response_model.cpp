@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -13,6 +12,7 @@
 #include "softarm/actuation/input_map.hpp"
 #include "softarm/model/actuation_matrix.hpp"
 #include "softarm/model/kinematics.hpp"
+#include "softarm/model/modes.hpp"
 #include "softarm/model/statics.hpp"
 
 namespace softarm {
@@ -289,12 +289,9 @@ double ResponseModel::fastest_1ps(const ArmHypothesis& arm) const {
   const Eigen::VectorXd straight = Eigen::VectorXd::Zero(dof);
   Eigen::MatrixXd B(dof, dof);
   inertia_matrix(arm.arm, workspace, straight, B);
-  const double smallest =
-      Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(B, Eigen::EigenvaluesOnly).eigenvalues()[0];
+  const double smallest = symmetric_modes(B).values[0];
   const Eigen::MatrixXd impedance = damping.asDiagonal();
-  const double damped = Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd>(
-                            impedance, B, Eigen::EigenvaluesOnly)
-                            .eigenvalues()[dof - 1];
+  const double damped = symmetric_modes(impedance, B).values[dof - 1];
   return std::max(damped, std::sqrt(springs.maxCoeff() / smallest));
 }
 

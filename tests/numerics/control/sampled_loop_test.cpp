@@ -97,8 +97,9 @@ TEST(SampledLoop, WithoutFeedbackTheArmDecaysByItself) {
   const Eigen::MatrixXd stiffness =
       gravity_slope(experiment.arm, zero) + segment.stiffness_nm_per_rad * one;
   A.topRightCorner(dof, dof) = one;
-  A.bottomLeftCorner(dof, dof) = -B.inverse() * stiffness;
-  A.bottomRightCorner(dof, dof) = -segment.damping_nms_per_rad * B.inverse();
+  const Eigen::MatrixXd mobility = B.inverse();
+  A.bottomLeftCorner(dof, dof) = -mobility * stiffness;
+  A.bottomRightCorner(dof, dof) = -segment.damping_nms_per_rad * mobility;
   const double slowest = A.eigenvalues().real().maxCoeff();
   EXPECT_LT(slowest, -1.0);
   // Windows of whole frames, not of whole oscillations: 2 %.

@@ -2,13 +2,14 @@
 // set for the pressures.
 #include <gtest/gtest.h>
 
-#include <Eigen/Dense>
+#include <Eigen/LU>
 #include <cmath>
 #include <limits>
 #include <numbers>
 #include <random>
 
 #include "actuation/box_projection.hpp"
+#include "dense_solvers.hpp"
 #include "softarm/actuation/pressure_allocator.hpp"
 
 namespace softarm {
@@ -46,15 +47,15 @@ double brute_scale(const Case& c) {
   for (int k = 0; k < m; ++k) {
     Eigen::Matrix2d basis;
     basis << c.W.col(k), -c.torque / length;
-    const Eigen::FullPivLU<Eigen::Matrix2d> lu(basis);
-    if (!lu.isInvertible()) continue;
+    if (std::abs(basis.determinant()) < 1e-15 * basis.col(0).norm()) continue;
+    const Eigen::Matrix2d inverse = basis.inverse();
     for (int bits = 0; bits < (1 << m); ++bits) {
       if ((bits >> k & 1) != 0) continue;
       Eigen::Vector2d rest = Eigen::Vector2d::Zero();
       for (int j = 0; j < m; ++j) {
         if (j != k) rest -= ((bits >> j & 1) != 0 ? c.hi : c.lo) * c.W.col(j);
       }
-      const Eigen::Vector2d x = lu.solve(rest);
+      const Eigen::Vector2d x = inverse * rest;
       if (x[0] > c.lo - 1e-11 && x[0] < c.hi + 1e-11) best = std::max(best, x[1]);
     }
   }
@@ -82,7 +83,7 @@ double brute_distance(const Case& c, const Eigen::Vector2d& target) {
     } else {
       Eigen::MatrixXd W(2, free.size());
       for (std::size_t i = 0; i < free.size(); ++i) W.col(static_cast<int>(i)) = c.W.col(free[i]);
-      const Eigen::VectorXd step = W.completeOrthogonalDecomposition().solve(rest);
+      const Eigen::VectorXd step = test::pseudo_inverse(W) * rest;
       if ((W * step - rest).norm() > 1e-10) continue;
       for (std::size_t i = 0; i < free.size(); ++i) p[free[i]] += step[static_cast<int>(i)];
     }
@@ -127,9 +128,9 @@ void check_kkt(const Case& c) {
     rows.row(static_cast<int>(i)) = c.W.col(free[i]).transpose();
     values[static_cast<int>(i)] = pressures[free[i]] - bias;
   }
-  const auto qr = rows.colPivHouseholderQr();
-  if (free.size() < 2 || qr.rank() < 2) return;  // lambda is not unique; brute force covers it
-  const Eigen::Vector2d lambda = qr.solve(values);
+  // Otherwise lambda is not unique; brute force covers it.
+  if (free.size() < 2 || test::singular_values(rows)[1] < 1e-12 * rows.norm()) return;
+  const Eigen::Vector2d lambda = test::pseudo_inverse(rows) * values;
   for (int j = 0; j < map.size(); ++j) {
     const double wanted = std::clamp(bias + c.W.col(j).dot(lambda), c.lo, c.hi);
     EXPECT_NEAR(pressures[j], wanted, 1e-9 * (1.0 + lambda.norm() * c.W.col(j).norm()));

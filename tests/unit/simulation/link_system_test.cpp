@@ -3,10 +3,10 @@
 
 #include <gtest/gtest.h>
 
-#include <Eigen/Eigenvalues>
 #include <numbers>
 #include <random>
 
+#include "softarm/model/modes.hpp"
 #include "softarm/simulation/arm_plant.hpp"
 #include "unit/simulation/paper_arm.hpp"
 
@@ -362,9 +362,7 @@ double lowest_frequency(SecondOrderSystem& system, bool axial = false) {
     B = Eigen::MatrixXd(B(along, along));
     K = Eigen::MatrixXd(K(along, along));
   }
-  const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> modes(
-      0.5 * (K + K.transpose()), B, Eigen::EigenvaluesOnly | Eigen::Ax_lBx);
-  return std::sqrt(modes.eigenvalues()[0]);
+  return std::sqrt(symmetric_modes(0.5 * (K + K.transpose()), B).values[0]);
 }
 
 TEST(PlantSystem, ManyPartsVibrateAsACantileverDoes) {
