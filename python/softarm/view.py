@@ -86,7 +86,8 @@ def read_log(path, experiment, config):
     with tempfile.TemporaryDirectory() as folder:
         program = pathlib.Path(__file__).resolve().parents[2] / "bin/softarm"
         report = [program if program.exists() else "softarm", "report", path, config, "--out", folder, "--no-plots"]
-        subprocess.run(report, check=True, stdout=subprocess.DEVNULL)
+        if subprocess.run(report, stdout=subprocess.DEVNULL).returncode != 0:  # and printed why
+            raise ValueError(f"{path}: expected a log that softarm report takes")
         return read_csv(pathlib.Path(folder) / "log.csv", experiment)
 
 
@@ -311,7 +312,7 @@ def main(config, log, host, port, control):
     except softarm.ConfigError as error:
         print(f"softarm view: {error}", file=sys.stderr)
         return 78
-    except (OSError, ValueError, subprocess.CalledProcessError, softarm.TransportError) as error:
+    except (OSError, ValueError, softarm.TransportError) as error:
         print(f"softarm view: {error}", file=sys.stderr)
         return 1
     print(f"softarm view: http://{host}:{view.server.get_port()} (Ctrl-C ends it)", flush=True)
