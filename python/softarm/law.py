@@ -4,6 +4,7 @@
         def __init__(self, experiment): ...
         def compute(self, state): return force    # (2n,), N m: generalized force in u
 
+Where segments stretch the state is (u_x, u_y, e) of every segment and the force has 3n numbers, every third in N.
 `state` is a softarm.LawState. A law may also have
 
     gives = "pressures"     # then compute returns set points of all chambers, (chambers,), bar
@@ -46,7 +47,7 @@ class Answers:
         if gives not in ("force", "pressures"):
             raise NoLaw(f"gives: expected 'force' or 'pressures', got {gives!r}")
         self._pressures = gives == "pressures"
-        self._size = sum(experiment.chambers) if self._pressures else 2 * experiment.segments
+        self._chambers = sum(experiment.chambers)
         self._validity_s = float(getattr(law, "validity_s", 0.05))
         self._active = False
 
@@ -56,8 +57,9 @@ class Answers:
             self._law.reset()
         self._active = active
         values = np.asarray(self._law.compute(state), dtype=float)
-        if values.shape != (self._size,):
-            raise ValueError(f"compute: expected {self._size} numbers, got an array of shape {values.shape}")
+        size = self._chambers if self._pressures else len(state.u)
+        if values.shape != (size,):
+            raise ValueError(f"compute: expected {size} numbers, got an array of shape {values.shape}")
         if not np.isfinite(values).all():
             raise ValueError(f"compute: expected finite numbers, got {values}")
         return values, self._pressures, self._validity_s

@@ -90,6 +90,26 @@ class Simulated(unittest.TestCase):
         self.assertEqual(log["mode"][-1], "ACTIVE")
         self.assertTrue(np.allclose(log["command_bar"][-1], 1.0))
 
+    def test_a_law_may_stretch_the_arm(self):
+        class Stretching:
+            arm = softarm.Arm(softarm.load_experiment(ROOT / "config/paper_arm_stretching.yaml"))
+            longer_m = 0.0
+
+            def compute(self, state):
+                assert state.u.shape == state.u_ref.shape == (9,)
+                goal = state.u_ref.copy()
+                goal[2::3] += self.longer_m
+                return self.arm.static_moments(goal)
+
+        class Longer(Stretching):
+            longer_m = 0.002
+
+        experiment = softarm.load_experiment(ROOT / "config/paper_arm_stretching.yaml")
+        short, long = (softarm.run(experiment, 2.0, law=law()) for law in (Stretching, Longer))
+        self.assertEqual(long["mode"][-1], "ACTIVE")
+        tip_mm = [1e3 * np.linalg.norm(log["tip_m"][-1]) for log in (short, long)]
+        self.assertAlmostEqual(tip_mm[1] - tip_mm[0], 3 * 2.0, delta=2.0)
+
     def test_what_a_law_must_not_give_is_an_error_with_its_reason(self):
         def law(values):
             return type("Law", (), {"compute": lambda self, state: values})()
