@@ -373,6 +373,11 @@ class Plant:
         e of every segment, (n,); empty where segments do not stretch
         """
     @property
+    def elongation_rate_mps(self) -> numpy.ndarray:
+        """
+        the same of e'
+        """
+    @property
     def pressure_bar(self) -> numpy.ndarray:
         ...
     @property

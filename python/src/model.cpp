@@ -144,10 +144,10 @@ py::object inverse(Arm& arm, const Vector& u, const Vector& velocity, const Vect
 
 MatrixXd whole_actuation_matrix(const Arm& arm, const Vector& u) {
   arm.u(u);
-  MatrixXd A = MatrixXd::Zero(arm.parameters.dof(), arm.parameters.dof());
-  for (int i = 0; i < arm.parameters.dof(); i += 2) {
-    A.block<2, 2>(i, i) = actuation_matrix(arm.parameters.actuation, u.segment<2>(i));
-  }
+  const int dof = arm.parameters.dof();
+  MatrixXd A(dof, dof);
+  for (int j = 0; j < dof; ++j)
+    apply_actuation(arm.parameters, u, VectorXd::Unit(dof, j), A.col(j));
   return A;
 }
 

@@ -251,6 +251,12 @@ class Stretching(unittest.TestCase):
         pressure_bar = np.linspace(0.1, 1.2, 12)
         force = allocator.generalized_force(pressure_bar)
         self.assertEqual(force.shape, (9,))
+        u = np.array([0.4, -0.3, 0.01, 0.0, 0.7, -0.004, -0.9, 0.2, 0.02])
+        moments = np.linalg.solve(softarm.Arm(self.EXPERIMENT).actuation_matrix(u), force)
+        np.testing.assert_allclose(moments[2::3], force[2::3], rtol=1e-12)
+        pressures, scale = allocator.allocate(moments)
+        np.testing.assert_array_equal(scale, 1.0)
+        np.testing.assert_allclose(allocator.generalized_force(pressures), force, atol=1e-9)
         np.testing.assert_allclose(allocator.input_matrix @ pressure_bar, force, rtol=1e-12)
 
     def test_a_plant_has_its_elongation(self):
