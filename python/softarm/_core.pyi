@@ -63,7 +63,8 @@ class Arm:
     """
     The model of an arm of n segments with constant curvature.
     
-    The state is u = theta [cos phi, sin phi] of every segment, (2n,), rad.
+    The state is u = theta [cos phi, sin phi] of every segment, (2n,), rad. Where segments stretch it
+    is (u_x, u_y, e) of every segment, (3n,), with e in m, and forces along e are in N.
     A wrong size, NaN or inf raises ValueError. Not for two threads at a time.
     """
     @staticmethod
@@ -203,7 +204,7 @@ class Allocator:
         """
     def generalized_force(self, pressure_bar: numpy.ndarray) -> numpy.ndarray:
         """
-        Generalized force in u that pressures give, (2n,), N m.
+        Generalized force in u that pressures give, (2n,), N m; where segments stretch (3n,).
         """
     @property
     def chambers(self) -> int:
@@ -212,6 +213,7 @@ class Allocator:
     def input_matrix(self) -> numpy.ndarray:
         """
         d generalized_force / d pressure, (2n, chambers), N m/bar: it does not depend on u.
+        Where segments stretch (3n, chambers), every third row in N/bar.
         """
 class Controller:
     """
@@ -299,7 +301,8 @@ class PlantError(RuntimeError):
 class LawState:
     """
     What a control law of one's own is to answer, of the instant at which its answer acts. Unless
-    ACTIVE, the reference rests where the arm is.
+    ACTIVE, the reference rests where the arm is. Of segments that stretch (u_x, u_y, e) each:
+    3n in place of 2n, every third number in m.
     """
     def __repr__(self) -> str:
         ...
@@ -365,6 +368,16 @@ class Plant:
     def chambers(self) -> int:
         ...
     @property
+    def elongation_m(self) -> numpy.ndarray:
+        """
+        e of every segment, (n,); empty where segments do not stretch
+        """
+    @property
+    def elongation_rate_mps(self) -> numpy.ndarray:
+        """
+        the same of e'
+        """
+    @property
     def pressure_bar(self) -> numpy.ndarray:
         ...
     @property
@@ -419,6 +432,16 @@ class Status:
     @property
     def armed(self) -> bool:
         ...
+    @property
+    def elongation_m(self) -> numpy.ndarray:
+        """
+        e of every segment, (n,); empty where segments do not stretch
+        """
+    @property
+    def elongation_ref_m(self) -> numpy.ndarray:
+        """
+        the same of the reference, NaN unless ACTIVE
+        """
     @property
     def frame_age_s(self) -> float:
         ...
@@ -488,6 +511,11 @@ class PlantState:
     The true state of a simulated arm.
     """
     @property
+    def elongation_m(self) -> numpy.ndarray:
+        """
+        e of every segment, (n,); empty where segments do not stretch
+        """
+    @property
     def pressure_bar(self) -> numpy.ndarray:
         ...
     @property
@@ -517,8 +545,8 @@ class ArmClient:
         ...
     def answer_law(self, state: LawState, values: numpy.ndarray, pressures: bool = False, validity_s: float = 0.05) -> None:
         """
-        Answer it by a generalized force (2n, N m) or by pressures (bar, one a chamber), valid for
-        validity_s from the state on.
+        Answer it by a generalized force (as long as u; N m, along e N) or by pressures (bar, one a
+        chamber), valid for validity_s from the state on.
         """
     def command_chambers(self, pressure_bar: numpy.ndarray) -> None:
         """

@@ -13,7 +13,8 @@ class ReachEnv(gymnasium.Env):
     """Bring the tip of the experiment's simulated arm to a point.
 
     Action: pressures, (chambers,), each from -1 (the lowest the experiment allows) to 1 (the highest).
-    Observation: u (rad), u' (rad/s), pressures (bar), tip and target (m, world), one after the other.
+    Observation: u (rad), u' (rad/s), where segments stretch e (m) and e' (m/s), pressures (bar), tip and target (m,
+    world), one after the other.
     Reward: minus the distance from tip to target in m, times the time of a step in s.
     An episode ends, terminated, where a segment bends by more than the experiment's control.max_theta_rad
     or the integrator fails, and truncated after episode_s. A target is the tip of a shape at rest under
@@ -49,7 +50,9 @@ class ReachEnv(gymnasium.Env):
 
     def _observation(self):
         plant = self._plant
-        return np.concatenate([plant.u, plant.velocity, plant.pressure_bar, plant.tip_m, self._target])
+        return np.concatenate(
+            [plant.u, plant.velocity, plant.elongation_m, plant.elongation_rate_mps, plant.pressure_bar, plant.tip_m, self._target]
+        )
 
     def _random_target(self):
         while True:
@@ -58,7 +61,8 @@ class ReachEnv(gymnasium.Env):
             force = self._allocator.generalized_force(pressures)
             moments = np.linalg.solve(self._arm.actuation_matrix(np.zeros(self._arm.dof)), force)
             u = self._arm.rest_shape(moments)
-            if u is not None and np.all(np.hypot(u[0::2], u[1::2]) < self._max_theta):
+            width = self._arm.dof // self._arm.segments
+            if u is not None and np.all(np.hypot(u[0::width], u[1::width]) < self._max_theta):
                 return self._arm.tip(u)
 
     def reset(self, *, seed=None, options=None):
@@ -66,7 +70,7 @@ class ReachEnv(gymnasium.Env):
         super().reset(seed=seed)
         zero = np.zeros(self._plant.chambers)
         self._plant = softarm.Plant(self._experiment)  # an integrator that goes on would not repeat its bits
-        self._plant.reset(self._start_u, np.zeros(self._arm.dof), np.clip(zero, self._lowest, self._highest))
+        self._plant.reset(self._start_u, np.zeros(self._start_u.size), np.clip(zero, self._lowest, self._highest))
         self._steps = 0
         chosen = (options or {}).get("target_m")
         self._target = self._random_target() if chosen is None else np.array(chosen, dtype=float).reshape(3)

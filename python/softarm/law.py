@@ -4,6 +4,7 @@
         def __init__(self, experiment): ...
         def compute(self, state): return force    # (2n,), N m: generalized force in u
 
+Where segments stretch the state is (u_x, u_y, e) of every segment and the force has 3n numbers, every third in N.
 `state` is a softarm.LawState. A law may also have
 
     gives = "pressures"     # then compute returns set points of all chambers, (chambers,), bar
@@ -33,6 +34,10 @@ import softarm
 from softarm import _core
 
 
+class NoLaw(ValueError):
+    """What was named or given is no law: a message for a person, without the place in the code."""
+
+
 class Answers:
     """Asks a law and checks what it gives: state -> (values, whether these are pressures, validity in s)."""
 
@@ -40,9 +45,9 @@ class Answers:
         self._law = law
         gives = getattr(law, "gives", "force")
         if gives not in ("force", "pressures"):
-            raise ValueError(f"gives: expected 'force' or 'pressures', got {gives!r}")
+            raise NoLaw(f"gives: expected 'force' or 'pressures', got {gives!r}")
         self._pressures = gives == "pressures"
-        self._size = sum(experiment.chambers) if self._pressures else 2 * experiment.segments
+        self._chambers = sum(experiment.chambers)
         self._validity_s = float(getattr(law, "validity_s", 0.05))
         self._active = False
 
@@ -52,8 +57,9 @@ class Answers:
             self._law.reset()
         self._active = active
         values = np.asarray(self._law.compute(state), dtype=float)
-        if values.shape != (self._size,):
-            raise ValueError(f"compute: expected {self._size} numbers, got an array of shape {values.shape}")
+        size = self._chambers if self._pressures else len(state.u)
+        if values.shape != (size,):
+            raise ValueError(f"compute: expected {size} numbers, got an array of shape {values.shape}")
         if not np.isfinite(values).all():
             raise ValueError(f"compute: expected finite numbers, got {values}")
         return values, self._pressures, self._validity_s
@@ -63,18 +69,25 @@ def load(name):
     """The class that MODULE:CLASS or FILE.py:CLASS names."""
     where, _, what = name.rpartition(":")
     if not where or not what:
-        raise ValueError(f"law: expected MODULE:CLASS or FILE.py:CLASS, got {name!r}")
+        raise NoLaw(f"law: expected MODULE:CLASS or FILE.py:CLASS, got {name!r}")
     if where.endswith(".py"):
         path = pathlib.Path(where)
         if not path.exists():
-            raise FileNotFoundError(f"{where}: no such file")
+            raise NoLaw(f"{where}: no such file")
         spec = importlib.util.spec_from_file_location(path.stem, path)
         module = importlib.util.module_from_spec(spec)
         sys.modules[path.stem] = module
         spec.loader.exec_module(module)
     else:
         sys.path.insert(0, "")
-        module = importlib.import_module(where)
+        try:
+            module = importlib.import_module(where)
+        except ModuleNotFoundError as error:
+            if error.name != where:  # the module itself is there
+                raise
+            raise NoLaw(f"{where}: no such module") from error
+    if not hasattr(module, what):
+        raise NoLaw(f"{where}: expected a class {what}, found none")
     return getattr(module, what)
 
 
@@ -82,7 +95,11 @@ def answer_socket(answers, connection):
     """In lock step: one answer to each state, until the other end closes."""
     while data := connection.recv(65536):
         state = _core._decode_law_state(data)
-        connection.send(_core._encode_law_answer(state, *answers(state)))
+        answer = _core._encode_law_answer(state, *answers(state))
+        try:
+            connection.send(answer)
+        except BrokenPipeError:
+            return
 
 
 def answer_daemon(answers, experiment, duration_s=None):
@@ -132,7 +149,7 @@ def main(arguments=None):
     except softarm.ConfigError as error:
         print(f"softarm law: {error}", file=sys.stderr)
         return 78
-    except (OSError, ImportError, AttributeError, softarm.TransportError) as error:
+    except (NoLaw, softarm.TransportError) as error:
         print(f"softarm law: {error}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:

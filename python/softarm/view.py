@@ -9,7 +9,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -36,12 +36,20 @@ class Picture:
     u_ref: np.ndarray
     u_true: np.ndarray
     pressure_bar: np.ndarray
+    e: np.ndarray = field(default_factory=lambda: np.empty(0))  # m, where segments stretch, as all below
+    e_ref: np.ndarray = field(default_factory=lambda: np.empty(0))
+    e_true: np.ndarray = field(default_factory=lambda: np.empty(0))
 
     def error_mrad(self):
         """Reference minus estimate, largest component; NaN where there is no reference."""
         if self.u_ref.size != self.u.size or self.u.size == 0 or not np.all(np.isfinite(self.u_ref)):
             return float("nan")
         return 1e3 * float(np.max(np.abs(self.u_ref - self.u)))
+
+
+def with_elongation(u, e):
+    """The state that softarm.Arm takes: (u_x, u_y, e) of every segment where there are e."""
+    return u if e.size == 0 or u.size != 2 * e.size else np.column_stack([u.reshape(-1, 2), e]).ravel()
 
 
 def live_pictures(client, step=None):
@@ -64,14 +72,17 @@ def live_pictures(client, step=None):
             plant_us, moved = plant.time_us, now
         pressure = client.measured_bar
         true = plant.u if plant else np.empty(0)
+        e_true = plant.elongation_m if plant else np.empty(0)
         if new:
             start_us = start_us or status.time_us
             bar = status.pressure_bar if pressure is None else pressure
-            yield Picture((status.time_us - start_us) / 1e6, status.mode, status.reason, status.u, status.u_ref, true, bar)
+            yield Picture((status.time_us - start_us) / 1e6, status.mode, status.reason, status.u, status.u_ref, true, bar,
+                          status.elongation_m, status.elongation_ref_m, e_true)
         elif now - heard > SILENT_S and now - moved < SILENT_S:
             start_us = start_us or plant_us
             bar = plant.pressure_bar if pressure is None else pressure
-            yield Picture((plant_us - start_us) / 1e6, "NO DAEMON", "none", client.seen_u, np.empty(0), true, bar)
+            yield Picture((plant_us - start_us) / 1e6, "NO DAEMON", "none", client.seen_u, np.empty(0), true, bar,
+                          e_true=e_true)
         elif now - heard > SILENT_S:
             yield None
 
@@ -86,7 +97,8 @@ def read_log(path, experiment, config):
     with tempfile.TemporaryDirectory() as folder:
         program = pathlib.Path(__file__).resolve().parents[2] / "bin/softarm"
         report = [program if program.exists() else "softarm", "report", path, config, "--out", folder, "--no-plots"]
-        subprocess.run(report, check=True, stdout=subprocess.DEVNULL)
+        if subprocess.run(report, stdout=subprocess.DEVNULL).returncode != 0:  # and printed why
+            raise ValueError(f"{path}: expected a log that softarm report takes")
         return read_csv(pathlib.Path(folder) / "log.csv", experiment)
 
 
@@ -101,10 +113,15 @@ def read_csv(path, experiment):
         return np.array([[float(row.get(name) or "nan") for name in names] for row in rows])
 
     chambers = [name for name in rows[0] if name.startswith("pm") and name.endswith("_bar")]
+    def lengths(prefix):
+        names = [f"{prefix}{i + 1}_m" for i in range(experiment.segments) if f"{prefix}{i + 1}_m" in rows[0]]
+        return np.array([[float(row[name] or "nan") for name in names] for row in rows])
+
     u, u_ref, u_true = columns("u", "rad"), columns("ref", "rad"), columns("true", "rad")
+    e, e_ref, e_true = lengths("e"), lengths("eref"), lengths("etrue")
     pressures = np.array([[float(row[name] or "nan") for name in chambers] for row in rows])
     return [
-        Picture(float(row["t_s"]), row["mode"], row["reason"], u[k], u_ref[k], u_true[k], pressures[k])
+        Picture(float(row["t_s"]), row["mode"], row["reason"], u[k], u_ref[k], u_true[k], pressures[k], e[k], e_ref[k], e_true[k])
         for k, row in enumerate(rows)
     ]
 
@@ -242,7 +259,12 @@ class View:
     def show(self, picture):
         """Draws one instant."""
         with self.server.atomic():
-            for name, u in (("measured", picture.u), ("reference", picture.u_ref), ("truth", picture.u_true)):
+            for name, bend, e in (
+                ("measured", picture.u, picture.e),
+                ("reference", picture.u_ref, picture.e_ref),
+                ("truth", picture.u_true, picture.e_true),
+            ):
+                u = with_elongation(bend, e)
                 known = u.size == self._arm.dof and bool(np.all(np.isfinite(u)))
                 self._lines[name].visible = known
                 if known:
@@ -311,7 +333,7 @@ def main(config, log, host, port, control):
     except softarm.ConfigError as error:
         print(f"softarm view: {error}", file=sys.stderr)
         return 78
-    except (OSError, ValueError, subprocess.CalledProcessError, softarm.TransportError) as error:
+    except (OSError, ValueError, softarm.TransportError) as error:
         print(f"softarm view: {error}", file=sys.stderr)
         return 1
     print(f"softarm view: http://{host}:{view.server.get_port()} (Ctrl-C ends it)", flush=True)

@@ -77,6 +77,12 @@ void bind_messages(py::module_& module) {
           "u_ref", [](const ArmStatus& s) { return VectorXd(s.reference_u_rad); },
           "NaN unless ACTIVE")
       .def_property_readonly(
+          "elongation_m", [](const ArmStatus& s) { return VectorXd(s.elongation_m); },
+          "e of every segment, (n,); empty where segments do not stretch")
+      .def_property_readonly(
+          "elongation_ref_m", [](const ArmStatus& s) { return VectorXd(s.reference_elongation_m); },
+          "the same of the reference, NaN unless ACTIVE")
+      .def_property_readonly(
           "tau_actuation_nm", [](const ArmStatus& s) { return VectorXd(s.tau_actuation_nm); },
           "NaN unless ACTIVE")
       .def_property_readonly(
@@ -89,6 +95,9 @@ void bind_messages(py::module_& module) {
       .def_property_readonly("u", [](const PlantState& s) { return VectorXd(s.u_rad); })
       .def_property_readonly("velocity",
                              [](const PlantState& s) { return VectorXd(s.velocity_radps); })
+      .def_property_readonly(
+          "elongation_m", [](const PlantState& s) { return VectorXd(s.elongation_m); },
+          "e of every segment, (n,); empty where segments do not stretch")
       .def_property_readonly("pressure_bar",
                              [](const PlantState& s) { return VectorXd(s.pressure_bar); })
       .def_readonly("tip_m", &PlantState::tip_m);
@@ -165,9 +174,9 @@ void bind_client(py::module_& module) {
           },
           py::arg("state"), py::arg("values"), py::arg("pressures") = false,
           py::arg("validity_s") = 0.05,
-          "Answer it by a generalized force (2n, N m) or by pressures (bar, one a chamber), valid "
-          "for\n"
-          "validity_s from the state on.")
+          "Answer it by a generalized force (as long as u; N m, along e N) or by pressures (bar, "
+          "one a\n"
+          "chamber), valid for validity_s from the state on.")
       .def("lock_commands", &ArmClient::lock_commands,
            "Take softarmd's place on this machine. RuntimeError while another program has it.")
       .def(

@@ -156,20 +156,22 @@ void bind_allocator(py::module_& module) {
                                         force);
             return force;
           },
-          py::arg("pressure_bar"), "Generalized force in u that pressures give, (2n,), N m.")
+          py::arg("pressure_bar"),
+          "Generalized force in u that pressures give, (2n,), N m; where segments stretch (3n,).")
       .def_property_readonly(
           "input_matrix",
           [](const PressureAllocator& allocator) {
             const int chambers = allocator.chambers();
-            Eigen::MatrixXd matrix(2 * allocator.segments(), chambers);
-            VectorXd force(2 * allocator.segments());
+            Eigen::MatrixXd matrix(allocator.dimension(), chambers);
+            VectorXd force(allocator.dimension());
             for (int j = 0; j < chambers; ++j) {
               allocator.generalized_force(VectorXd::Unit(chambers, j), force);
               matrix.col(j) = force;
             }
             return matrix;
           },
-          "d generalized_force / d pressure, (2n, chambers), N m/bar: it does not depend on u.");
+          "d generalized_force / d pressure, (2n, chambers), N m/bar: it does not depend on u.\n"
+          "Where segments stretch (3n, chambers), every third row in N/bar.");
 }
 
 }  // namespace

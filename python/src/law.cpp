@@ -42,7 +42,8 @@ void bind_law(py::module_& module) {
       module, "LawState",
       "What a control law of one's own is to answer, of the instant at which its answer acts. "
       "Unless\n"
-      "ACTIVE, the reference rests where the arm is.")
+      "ACTIVE, the reference rests where the arm is. Of segments that stretch (u_x, u_y, e) each:\n"
+      "3n in place of 2n, every third number in m.")
       .def_readonly("tick", &LawRequest::tick)
       .def_property_readonly("mode", [](const LawRequest& s) { return name(s.mode); })
       .def_readonly("active_s", &LawRequest::active_s, "since the arm became ACTIVE, otherwise 0")

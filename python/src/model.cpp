@@ -86,6 +86,7 @@ MatrixXd centre_line(const Arm& arm, const Vector& u, int points_per_segment) {
   }
   const ArmParameters& parameters = arm.parameters;
   const auto ends = segment_ends(parameters, arm.u(u));
+  const Eigen::Index width = parameters.segment_dof();
   MatrixXd points(parameters.size() * points_per_segment + 1, 3);
   points.row(0) = parameters.base_position_m.transpose();
   Eigen::Isometry3d frame = Eigen::Isometry3d::Identity();
@@ -94,10 +95,11 @@ MatrixXd centre_line(const Arm& arm, const Vector& u, int points_per_segment) {
   Eigen::Index row = 1;
   for (int i = 0; i < parameters.size(); ++i) {
     const auto segment = static_cast<std::size_t>(i);
+    const double elongation_m = parameters.extensible ? u[3 * i + 2] : 0.0;
+    const double length_m = parameters.segments[segment].length_m + elongation_m;
     for (int k = 1; k <= points_per_segment; ++k) {
-      const Eigen::Vector3d point =
-          segment_point(parameters.segments[segment].length_m, u.segment<2>(2 * i),
-                        static_cast<double>(k) / points_per_segment);
+      const Eigen::Vector3d point = segment_point(length_m, u.segment<2>(width * i),
+                                                  static_cast<double>(k) / points_per_segment);
       points.row(row++) = (frame * point).transpose();
     }
     frame = ends[segment];
@@ -142,10 +144,10 @@ py::object inverse(Arm& arm, const Vector& u, const Vector& velocity, const Vect
 
 MatrixXd whole_actuation_matrix(const Arm& arm, const Vector& u) {
   arm.u(u);
-  MatrixXd A = MatrixXd::Zero(arm.parameters.dof(), arm.parameters.dof());
-  for (int i = 0; i < arm.parameters.dof(); i += 2) {
-    A.block<2, 2>(i, i) = actuation_matrix(arm.parameters.actuation, u.segment<2>(i));
-  }
+  const int dof = arm.parameters.dof();
+  MatrixXd A(dof, dof);
+  for (int j = 0; j < dof; ++j)
+    apply_actuation(arm.parameters, u, VectorXd::Unit(dof, j), A.col(j));
   return A;
 }
 
@@ -275,7 +277,9 @@ void bind_model(py::module_& module) {
   py::class_<Arm> type(
       module, "Arm",
       "The model of an arm of n segments with constant curvature.\n\n"
-      "The state is u = theta [cos phi, sin phi] of every segment, (2n,), rad.\n"
+      "The state is u = theta [cos phi, sin phi] of every segment, (2n,), rad. Where segments "
+      "stretch it\n"
+      "is (u_x, u_y, e) of every segment, (3n,), with e in m, and forces along e are in N.\n"
       "A wrong size, NaN or inf raises ValueError. Not for two threads at a time.");
   const Eigen::Matrix3d hanging = Eigen::Vector3d(1.0, -1.0, -1.0).asDiagonal();
   type.def(py::init(&make_arm), py::arg("length_m"), py::arg("mass_kg"),

@@ -195,6 +195,13 @@ void bind_simulation(py::module_& module) {
       .def_property_readonly("u", [](const ArmPlant& plant) { return VectorXd(plant.u_rad()); })
       .def_property_readonly("velocity",
                              [](const ArmPlant& plant) { return VectorXd(plant.velocity_radps()); })
+      .def_property_readonly(
+          "elongation_m", [](const ArmPlant& plant) { return VectorXd(plant.elongation_m()); },
+          "e of every segment, (n,); empty where segments do not stretch")
+      .def_property_readonly(
+          "elongation_rate_mps",
+          [](const ArmPlant& plant) { return VectorXd(plant.elongation_rate_mps()); },
+          "the same of e'")
       .def_property_readonly("pressure_bar",
                              [](const ArmPlant& plant) { return VectorXd(plant.pressures_bar()); })
       .def_property_readonly("tip_m", &ArmPlant::tip_m)

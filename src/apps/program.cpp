@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cerrno>
+#include <charconv>
 #include <cmath>
 #include <csignal>
 #include <cstdio>
@@ -107,6 +108,18 @@ CLI::Validator number_between(double low, double high) {
                : fmt::format("expected {:g} to {:g}, got {}", low, high, text);
   };
   return {check, fmt::format("{:g} to {:g}", low, high)};
+}
+
+CLI::Validator seed_number() {
+  static constexpr std::uint64_t kLargest = 1ULL << 53;
+  const auto check = [](std::string& text) -> std::string {
+    std::uint64_t seed = 0;
+    const auto [end, code] = std::from_chars(text.data(), text.data() + text.size(), seed);
+    return code == std::errc() && end == text.data() + text.size() && seed <= kLargest
+               ? std::string()
+               : fmt::format("expected a whole number in [0, {}], got {}", kLargest, text);
+  };
+  return {check, "SEED"};
 }
 
 CLI::Validator positive_seconds() {

@@ -3,6 +3,7 @@
 
 #include <CLI/CLI.hpp>
 #include <functional>
+#include <map>
 #include <string>
 #include <string_view>
 
@@ -37,6 +38,23 @@ CLI::Validator positive_seconds();
 
 /// Accepts a number from `low` to `high`; "nan" is refused.
 CLI::Validator number_between(double low, double high);
+
+/// Accepts one of these words, for an option of the type E.
+template <class E>
+CLI::Validator one_word_of(const std::map<std::string, E>& words) {
+  std::string names;
+  for (const auto& [word, value] : words) names += (names.empty() ? "" : ", ") + word;
+  const auto read = [words, names](std::string& text) -> std::string {
+    const auto found = words.find(text);
+    if (found == words.end()) return "expected one of " + names + ", got " + text;
+    text = std::to_string(static_cast<int>(found->second));
+    return {};
+  };
+  return {read, names};
+}
+
+/// Accepts a seed: a whole number from 0 to 2^53, as in an experiment.
+CLI::Validator seed_number();
 
 /// Prints "NAME: error: MESSAGE" on stderr.
 void print_error(const std::string& program, const std::string& message);

@@ -18,7 +18,10 @@ import softarm.gym
 
 PAPER_ARM = pathlib.Path(__file__).resolve().parents[2] / "config/paper_arm.yaml"
 
-env_checker.check_env(softarm.gym.ReachEnv(PAPER_ARM))
+STRETCHING = PAPER_ARM.with_name("paper_arm_stretching.yaml")
+
+for file in (PAPER_ARM, STRETCHING):
+    env_checker.check_env(softarm.gym.ReachEnv(file))
 
 env = softarm.gym.ReachEnv(PAPER_ARM, episode_s=12.0)  # the open-loop arm takes that long to come to rest
 arm, allocator = softarm.Arm(softarm.load_experiment(PAPER_ARM)), softarm.Allocator(softarm.load_experiment(PAPER_ARM))

@@ -90,6 +90,26 @@ class Simulated(unittest.TestCase):
         self.assertEqual(log["mode"][-1], "ACTIVE")
         self.assertTrue(np.allclose(log["command_bar"][-1], 1.0))
 
+    def test_a_law_may_stretch_the_arm(self):
+        class Stretching:
+            arm = softarm.Arm(softarm.load_experiment(ROOT / "config/paper_arm_stretching.yaml"))
+            longer_m = 0.0
+
+            def compute(self, state):
+                assert state.u.shape == state.u_ref.shape == (9,)
+                goal = state.u_ref.copy()
+                goal[2::3] += self.longer_m
+                return self.arm.static_moments(goal)
+
+        class Longer(Stretching):
+            longer_m = 0.002
+
+        experiment = softarm.load_experiment(ROOT / "config/paper_arm_stretching.yaml")
+        short, long = (softarm.run(experiment, 2.0, law=law()) for law in (Stretching, Longer))
+        self.assertEqual(long["mode"][-1], "ACTIVE")
+        tip_mm = [1e3 * np.linalg.norm(log["tip_m"][-1]) for log in (short, long)]
+        self.assertAlmostEqual(tip_mm[1] - tip_mm[0], 3 * 2.0, delta=2.0)
+
     def test_what_a_law_must_not_give_is_an_error_with_its_reason(self):
         def law(values):
             return type("Law", (), {"compute": lambda self, state: values})()
@@ -129,12 +149,26 @@ class Command(unittest.TestCase):
         self.assertEqual(len(rows), len(log["t_s"]))
         self.assertAlmostEqual(float(rows[-1]["true1_x_rad"]), log["u_true"][-1][0], delta=1e-9)
 
+    def test_a_mistake_in_a_law_is_shown_with_its_line(self):
+        with tempfile.TemporaryDirectory() as folder:
+            file = pathlib.Path(folder) / "broken.py"
+            file.write_text("class Broken:\n    def __init__(self, experiment):\n        self.arm = None\n\n"
+                            "    def compute(self, state):\n        return self.arm.static_moments(state.u_ref)\n")
+            done, _ = self.run_softarm(ROOT / "config/paper_arm.yaml", "--law", f"{file}:Broken")
+        self.assertEqual(done.returncode, 1, done.stderr)
+        self.assertIn("line 6, in compute", done.stderr)
+
     def test_mistakes_are_named(self):
         for law, reason in ((f"{ROOT}/examples/own_law.py:Missing", "Missing"), ("no_such_module:Law", "no_such_module"),
-                            ("nonsense", "expected MODULE:CLASS")):
+                            ("nowhere.py:Law", "nowhere.py")):
             done, _ = self.run_softarm(ROOT / "config/paper_arm.yaml", "--law", law)
             self.assertEqual(done.returncode, 1, done.stderr)
             self.assertIn(reason, done.stderr)
+            self.assertNotIn("Traceback", done.stderr)
+        for law in ("nonsense", "examples/own_law.py", ":Law", "module:"):
+            done, _ = self.run_softarm(ROOT / "config/paper_arm.yaml", "--law", law)
+            self.assertEqual(done.returncode, 64, done.stderr)
+            self.assertIn("expected MODULE:CLASS", done.stderr)
         done, _ = self.run_softarm(ROOT / "config/external_law.yaml")
         self.assertEqual(done.returncode, 64, done.stderr)
         self.assertIn("--law", done.stderr)

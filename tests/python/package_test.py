@@ -232,6 +232,44 @@ class Simulation(unittest.TestCase):
         np.testing.assert_allclose(plant.segment_poses, arm.segment_poses(u), atol=1e-6)
 
 
+class Stretching(unittest.TestCase):
+    """Where segments stretch every state has three numbers a segment."""
+
+    EXPERIMENT = softarm.load_experiment(ROOT / "config/paper_arm_stretching.yaml")
+
+    def test_the_arc_ends_where_the_segments_do(self):
+        arm = softarm.Arm(self.EXPERIMENT)
+        u = np.array([0.4, -0.3, 0.01, 0.0, 0.7, -0.004, -0.9, 0.2, 0.02])
+        line = arm.centre_line(u, 7)
+        self.assertEqual(line.shape, (22, 3))
+        np.testing.assert_allclose(line[7::7], np.array(arm.segment_poses(u))[:, :3, 3], atol=1e-12)
+        pieces = np.linalg.norm(np.diff(arm.centre_line(u, 400), axis=0), axis=1).reshape(3, 400).sum(axis=1)
+        np.testing.assert_allclose(pieces, arm.length_m + u[2::3], rtol=1e-5)
+
+    def test_the_input_matrix_is_that_of_the_force(self):
+        allocator = softarm.Allocator(self.EXPERIMENT)
+        pressure_bar = np.linspace(0.1, 1.2, 12)
+        force = allocator.generalized_force(pressure_bar)
+        self.assertEqual(force.shape, (9,))
+        u = np.array([0.4, -0.3, 0.01, 0.0, 0.7, -0.004, -0.9, 0.2, 0.02])
+        moments = np.linalg.solve(softarm.Arm(self.EXPERIMENT).actuation_matrix(u), force)
+        np.testing.assert_allclose(moments[2::3], force[2::3], rtol=1e-12)
+        pressures, scale = allocator.allocate(moments)
+        np.testing.assert_array_equal(scale, 1.0)
+        np.testing.assert_allclose(allocator.generalized_force(pressures), force, atol=1e-9)
+        np.testing.assert_allclose(allocator.input_matrix @ pressure_bar, force, rtol=1e-12)
+
+    def test_a_plant_has_its_elongation(self):
+        plant = softarm.Plant(self.EXPERIMENT)
+        for _ in range(20):
+            plant.advance(0.2, np.full(12, 0.5))
+        self.assertEqual((plant.u.size, plant.elongation_m.size), (6, 3))
+        state = np.ravel([[*u, e] for u, e in zip(plant.u.reshape(3, 2), plant.elongation_m, strict=True)])
+        np.testing.assert_allclose(softarm.Arm(self.EXPERIMENT).tip(state), plant.tip_m, atol=1e-6)
+        self.assertGreater(plant.elongation_m.min(), 1e-3)
+        self.assertEqual(softarm.Plant(softarm.load_experiment(PAPER_ARM)).elongation_m.size, 0)
+
+
 class Stubs(unittest.TestCase):
     def test_name_what_the_module_has(self):
         """Editors read _core.pyi: every public name and member of the module stands in it."""

@@ -22,19 +22,24 @@ import softarm.view
 
 SOFTARM = pathlib.Path(sys.argv[1]) / "softarm"
 CONFIG = ROOT / "config/paper_arm.yaml"
+STRETCHING = ROOT / "config/paper_arm_stretching.yaml"
 
 
-def drawn_where_the_arm_is(log):
-    experiment = softarm.load_experiment(CONFIG)
+def drawn_where_the_arm_is(log, config):
+    experiment = softarm.load_experiment(config)
     arm = softarm.Arm(experiment)
     view = softarm.view.View(experiment, "127.0.0.1", 0)
-    pictures = softarm.view.read_log(log, experiment, CONFIG)
+    pictures = softarm.view.read_log(log, experiment, config)
     assert pictures[-1].mode == "ACTIVE", pictures[-1]
     for picture in pictures[::50]:
         view.show(picture)
-        assert np.allclose(view.tip_m(), arm.tip(picture.u), atol=1e-6)
+        state = [list(u) for u in picture.u.reshape(-1, 2)]
+        if config == STRETCHING:
+            state = [[*u, e] for u, e in zip(state, picture.e, strict=True)]
+        assert np.allclose(view.tip_m(), arm.tip(np.ravel(state)), atol=1e-6)
+        assert all(line.visible for line in view._lines.values()) or picture.mode != "ACTIVE"
     tip = [float(cell or "nan") for cell in pathlib.Path(log, "log.csv").read_text().splitlines()[-1].split(",")[-6:-3]]
-    assert np.linalg.norm(arm.tip(picture.u) - tip) < 0.01, "the tip of the simulated arm"
+    assert np.linalg.norm(view.tip_m() - tip) < 0.01, "the tip of the simulated arm"
     page = urllib.request.urlopen(f"http://127.0.0.1:{view.server.get_port()}/").read().decode()
     assert "<html" in page
     view.server.stop()
@@ -61,11 +66,13 @@ def served(log):
 
 
 with tempfile.TemporaryDirectory() as folder:
-    subprocess.run([SOFTARM, "run", CONFIG, "--duration", "1.5", "--out", folder, "--no-plots"], check=True, capture_output=True)
-    drawn_where_the_arm_is(folder)
+    for config in (STRETCHING, CONFIG):
+        subprocess.run([SOFTARM, "run", config, "--duration", "1.5", "--out", folder, "--no-plots"], check=True, capture_output=True)
+        drawn_where_the_arm_is(folder, config)
     served(folder)
 answers(["--help"], 0, "CONFIG")
 answers([], 64, "CONFIG")
 answers(["/nowhere.yaml"], 78, "no such file")
 answers([CONFIG, "--log", "/nowhere.csv"], 1, "/nowhere.csv")
+answers([CONFIG, "--log", "/nowhere.lcm"], 1, r"cannot read /nowhere.lcm(?!.*Command '\[)(?s:.*)softarm view: /nowhere.lcm: expected")
 answers([CONFIG, "--log", "x", "--control"], 64, "--control")

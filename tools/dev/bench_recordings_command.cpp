@@ -32,6 +32,10 @@ void measure(RecordingsOptions options) {
     text = options.json ? json(report) : table(report);
   }
   for (const std::string& message : report.skipped) say("softarm-dev: " + message + "\n");
+  if (report.rows.empty()) {
+    print_error("softarm-dev", options.data + ": expected a recording that is known, found none");
+    throw CLI::RuntimeError(kExitFailure);
+  }
   std::fwrite(text.data(), 1, text.size(), stdout);
 }
 

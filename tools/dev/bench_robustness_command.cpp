@@ -118,7 +118,7 @@ void add_bench_robustness_command(CLI::App& group) {
       ->add_option(
           "--from", options->from_s,
           "count the 20 s from so many seconds after ACTIVE on [default: 1; held still: 3]")
-      ->check(CLI::NonNegativeNumber);
+      ->check(number_between(0.0, 1e4));
   CLI::Option* processes = command->add_flag("--processes", options->processes,
                                              "with softarmd and softarm-plant over LCM, in real "
                                              "time: one run of every scene but for ideal "
@@ -135,9 +135,9 @@ void add_bench_robustness_command(CLI::App& group) {
       ->check(CLI::Range(1, 100'000))
       ->excludes(processes)
       ->excludes(stretching);
-  command->add_option("--seed", options->seed, "of the arms drawn")->check(CLI::NonNegativeNumber);
+  command->add_option("--seed", options->seed, "of the arms drawn")->check(seed_number());
   command->add_option("--first", options->first, "number of the first of the arms drawn")
-      ->check(CLI::PositiveNumber)
+      ->check(CLI::Range(1, 1'000'000'000))
       ->capture_default_str();
   command->callback([options, command] {
     if (options->processes && command->count("--seeds") == 0) options->seeds = 1;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <limits>
 #include <memory>
 #include <random>
 
@@ -208,7 +209,7 @@ void add_fault_command(CLI::App& app) {
                      ->check(CLI::Number);
   command
       ->add_option("--body", options->body, "which body, or chamber, in the order of the message")
-      ->check(CLI::NonNegativeNumber);
+      ->check(CLI::Range(0, 10'000));
   command->add_option("--after", options->after_s, "seconds until the fault begins")
       ->check(number_between(0.0, 1e8));
   command->add_option("--for", options->for_s, "seconds until it ends")->check(positive_seconds());
@@ -216,8 +217,9 @@ void add_fault_command(CLI::App& app) {
   command
       ->add_option("--packets", options->packets,
                    "of hostile: so many that are malformed at random, instead of some for --for s")
-      ->check(CLI::PositiveNumber);
-  command->add_option("--pid", options->pid, "of the process to pause")->check(CLI::PositiveNumber);
+      ->check(CLI::Range(1L, 1'000'000'000L));
+  command->add_option("--pid", options->pid, "of the process to pause")
+      ->check(CLI::Range(1, std::numeric_limits<int>::max()));
   command->callback([options, amount = amount] {
     options->has_amount = amount->count() > 0;
     run(*options);

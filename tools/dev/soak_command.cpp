@@ -61,7 +61,7 @@ void add_soak_command(CLI::App& app) {
       ->check(positive_seconds())
       ->capture_default_str();
   command->add_option("--seed", options->soak.seed, "of faults and references")
-      ->check(CLI::NonNegativeNumber)
+      ->check(seed_number())
       ->capture_default_str();
   command->add_option(
       "--out", options->out,

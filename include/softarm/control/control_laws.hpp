@@ -37,7 +37,7 @@ enum class LawVerdict : std::int8_t {
   accepted,
   not_recent,     ///< answers no state of the last second of this daemon
   out_of_order,   ///< its sequence is not above that of the newest
-  wrong_size,     ///< not 2n forces, or not one pressure a chamber
+  wrong_size,     ///< not as many forces as the state has numbers, or not one pressure a chamber
   not_finite,     ///< a NaN or an infinity
   out_of_limits,  ///< a pressure the valves cannot have, or a force far beyond what chambers give
   expired         ///< its validity, counted from the state that it answers, has passed

@@ -68,8 +68,8 @@ void add_calibrate_command(CLI::App& app) {
           "--base", options->base,
           "source of the arm's axis at the base: its marker frame as configured (plate), or "
           "arm.base.rotation (arm)")
-      ->transform(CLI::CheckedTransformer(std::map<std::string, BaseSource>{
-          {"plate", BaseSource::marker_frame}, {"arm", BaseSource::arm}}));
+      ->transform(one_word_of(std::map<std::string, BaseSource>{{"plate", BaseSource::marker_frame},
+                                                                {"arm", BaseSource::arm}}));
   command->callback([options] {
     if (const int code = calibrate(*options); code != kExitOk) throw CLI::RuntimeError(code);
   });

@@ -2,6 +2,7 @@
 // running arm fits it.
 #include <fmt/format.h>
 
+#include <cmath>
 #include <memory>
 #include <string>
 
@@ -36,10 +37,12 @@ void print_margins(const LoopMargins& margins) {
     fmt::print("unstable\n");
     return;
   }
-  fmt::print("a disturbance fades at {:.2g} 1/s; gain margin {}{:.2f}, delay margin {}{:.1f} ms\n",
-             -margins.at.growth_1ps, margins.gain >= kLargestGainMargin ? "above " : "",
-             margins.gain, margins.delay_s >= kLargestDelayMargin_s ? "above " : "",
-             1e3 * margins.delay_s);
+  const std::string fades = std::isfinite(margins.at.growth_1ps)
+                                ? fmt::format("fades at {:.2g} 1/s", -margins.at.growth_1ps)
+                                : "leaves nothing after 4 s";
+  fmt::print("a disturbance {}; gain margin {}{:.2f}, delay margin {}{:.1f} ms\n", fades,
+             margins.gain >= kLargestGainMargin ? "above " : "", margins.gain,
+             margins.delay_s >= kLargestDelayMargin_s ? "above " : "", 1e3 * margins.delay_s);
 }
 
 int check(const CheckOptions& options) {

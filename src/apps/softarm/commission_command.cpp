@@ -142,7 +142,7 @@ void add_commission_command(CLI::App& app) {
   command
       ->add_option("--gains", settings.gains,
                    "separate gains for each: (default) arm, side, segment or chamber")
-      ->transform(CLI::CheckedTransformer(sharing));
+      ->transform(one_word_of(sharing));
   command->callback([options] {
     if (const int code = commission(*options); code != kExitOk) throw CLI::RuntimeError(code);
   });

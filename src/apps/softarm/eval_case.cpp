@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include <filesystem>
+
 #include "apps/softarm/eval_place.hpp"
 #include "softarm/config/config_error.hpp"
 
@@ -135,6 +137,7 @@ EvalCase read_case(const Place& place) {
 }
 
 YAML::Node load(const std::string& file) {
+  if (std::filesystem::is_directory(file)) throw ConfigError(file, 0, "", "a file", "a folder");
   try {
     return YAML::LoadFile(file);
   } catch (const YAML::BadFile&) {

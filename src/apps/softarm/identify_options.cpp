@@ -7,6 +7,8 @@
 namespace softarm {
 namespace {
 
+constexpr double kLongest_s = 1e8;
+
 void add_source_options(CLI::App& command, IdentifyCommand& options) {
   auto* log =
       command
@@ -29,10 +31,13 @@ void add_source_options(CLI::App& command, IdentifyCommand& options) {
   const std::map<std::string, LoggedInput> inputs = {{"commanded", LoggedInput::commanded},
                                                      {"measured", LoggedInput::measured}};
   command.add_option("--input", options.input, "pressures of the log: commanded or measured")
-      ->transform(CLI::CheckedTransformer(inputs));
-  command.add_option("--from", options.from_s, "begin in the log, s after its first frame");
-  command.add_option("--to", options.to_s, "end in the log (default: its end)");
-  command.add_option("--skip", options.skip_s, "simulate so many s before comparing");
+      ->transform(one_word_of(inputs));
+  command.add_option("--from", options.from_s, "begin in the log, s after its first frame")
+      ->check(number_between(0.0, kLongest_s));
+  command.add_option("--to", options.to_s, "end in the log (default: its end)")
+      ->check(number_between(0.0, kLongest_s));
+  command.add_option("--skip", options.skip_s, "simulate so many s before comparing")
+      ->check(number_between(0.0, kLongest_s));
   command.add_option("--apart", options.apart_s, "take frames of the log at least so many s apart")
       ->check(number_between(0.0, 10.0));
   command
@@ -53,7 +58,7 @@ void add_choice_options(CLI::App& command, IdentifyCommand& options) {
   command
       .add_option("--gains", options.choice.gains,
                   "separate gains for each: arm, side, segment or (default) chamber")
-      ->transform(CLI::CheckedTransformer(sharing));
+      ->transform(one_word_of(sharing));
   command.add_flag("--no-stiffness", options.no_stiffness,
                    "k as configured: for slow motion, which determines ratios only");
   command.add_flag("--no-damping", options.no_damping, "beta as configured");
@@ -122,13 +127,14 @@ void add_identify_options(CLI::App& command, IdentifyCommand& options) {
   command
       .add_option("--seed", options.seed,
                   "seed of noise and dropouts (default: the configuration's)")
-      ->check(CLI::NonNegativeNumber);
+      ->check(seed_number());
   command
       .add_option("--seeds", options.study.seeds,
                   "do it on so many arms drawn at random, and print how often the "
                   "intervals hold the truth")
       ->check(CLI::Range(1, 100000))
-      ->excludes("--live");
+      ->excludes("--live")
+      ->excludes("--log");
   command
       .add_option("--spread", options.study.spread,
                   "with --seeds: how far the truth is off the configured, at most")

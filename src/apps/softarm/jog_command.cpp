@@ -14,6 +14,8 @@
 #include "apps/softarm/raw_terminal.hpp"
 #include "softarm/client/arm_client.hpp"
 #include "softarm/config/load.hpp"
+#include "softarm/model/arm.hpp"
+#include "softarm/model/chambers.hpp"
 
 namespace softarm {
 namespace {
@@ -159,10 +161,10 @@ void add_jog_command(CLI::App& app) {
   command->add_option("CONFIG", options->config, "experiment in YAML")->required();
   command->add_option("SEGMENT", options->segment, "counted from 1 at the base")
       ->required()
-      ->check(CLI::PositiveNumber);
+      ->check(CLI::Range(1, kMaxSegments));
   command->add_option("CHAMBER", options->chamber, "of the segment, counted from 1")
       ->required()
-      ->check(CLI::PositiveNumber);
+      ->check(CLI::Range(1, kMaxChambersPerSegment));
   command->add_option("PRESSURE", options->pressure_bar, "in bar")
       ->required()
       ->check(number_between(0.0, 1e3));

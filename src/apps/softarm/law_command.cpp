@@ -24,7 +24,9 @@ void add_law_command(CLI::App& app) {
   auto options = std::make_shared<LawOptions>();
   CLI::App* command =
       app.add_subcommand("law", "Control a running arm by a law in Python (control.law: external)");
-  command->add_option("LAW", options->law, "MODULE:CLASS or FILE.py:CLASS")->required();
+  command->add_option("LAW", options->law, "MODULE:CLASS or FILE.py:CLASS")
+      ->required()
+      ->check(law_name());
   command->add_option("CONFIG", options->config, "experiment in YAML")->required();
   command->add_option("--duration", options->duration_s, "s; left out: until it is ended")
       ->check(positive_seconds());

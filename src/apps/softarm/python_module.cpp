@@ -31,4 +31,14 @@ std::string run_python_module(const std::string& module, const std::vector<std::
   return all[0];
 }
 
+CLI::Validator law_name() {
+  const auto check = [](std::string& text) -> std::string {
+    const std::size_t colon = text.rfind(':');
+    return colon != std::string::npos && colon > 0 && colon + 1 < text.size()
+               ? std::string()
+               : "expected MODULE:CLASS or FILE.py:CLASS, got " + text;
+  };
+  return {check, "MODULE:CLASS"};
+}
+
 }  // namespace softarm

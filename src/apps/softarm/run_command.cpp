@@ -1,5 +1,4 @@
-// softarm run: the daemon's pipeline and the simulated arm in one process, in lock step, as fast as
-// the machine allows.
+// softarm run: the daemon's pipeline and the simulated arm in one process, in lock step.
 #include <fmt/format.h>
 
 #include <cmath>
@@ -13,6 +12,7 @@
 #include "apps/softarm/law_process.hpp"
 #include "apps/softarm/learned_output.hpp"
 #include "apps/softarm/plots.hpp"
+#include "apps/softarm/python_module.hpp"
 #include "softarm/base/clock.hpp"
 #include "softarm/base/time.hpp"
 #include "softarm/config/load.hpp"
@@ -37,7 +37,8 @@ struct RunOptions {
 
 struct Recorded {
   std::int64_t took_ns = 0;  ///< wall time, with the log
-  bool was_active = false;
+  bool active = false, was_active = false;
+  Reason left = Reason::none;  ///< why ACTIVE was left the last time
 };
 
 /// Steps the source of the rows to its end, or to `duration_s`; one row per tick, or per
@@ -51,7 +52,10 @@ void record(Stepper& stepper, double duration_s, double period_s, std::int64_t t
   for (std::int64_t k = 0; k < ticks; ++k) {
     const bool logged = k % ticks_a_row == 0;
     if (stop_requested != 0 || !stepper.step(row, logged)) break;
-    recorded.was_active |= stepper.pipeline().output().mode == Mode::active;
+    const TickOutput& output = stepper.pipeline().output();
+    if (recorded.active && output.mode != Mode::active) recorded.left = output.reason;
+    recorded.active = output.mode == Mode::active;
+    recorded.was_active |= recorded.active;
     if (!logged) continue;
     log.add(row);
     shapes.add(row);
@@ -62,12 +66,11 @@ void record(Stepper& stepper, double duration_s, double period_s, std::int64_t t
 }
 
 /// Why an arm was never ACTIVE, from its state at the end.
-std::string never_active(const TickOutput& end, const Experiment& experiment, double duration_s) {
+std::string never_active(const TickOutput& end, int good_frames, double duration_s) {
   std::string text = fmt::format("the arm was never ACTIVE in {:.3g} s: {} ({})", duration_s,
                                  name(end.mode), name(end.reason));
   if (end.reason == Reason::waiting_for_frames)
-    text += fmt::format("; it takes {} good frames in a row (safety.good_frames)",
-                        experiment.safety.good_frames);
+    text += fmt::format("; it takes {} good frames in a row (safety.good_frames)", good_frames);
   return text;
 }
 
@@ -90,7 +93,7 @@ int run(const RunOptions& options) {
   summary.set_arm(experiment.arm);
   if (experiment.actuation.kind == ActuationKind::torque) summary.commands_are_torques();
   TimingReport timing;
-  std::string failure;
+  std::string failure, warning;
   const Files inputs = options.mocap_log.empty() ? Files() : Files{options.mocap_log};
   const auto record_and_report = [&](auto& stepper) {
     ExperimentLog log(options.out, experiment, inputs);
@@ -114,7 +117,11 @@ int run(const RunOptions& options) {
     timing.real_time_factor =
         summary.duration_s() / to_seconds(std::max<std::int64_t>(1, recorded.took_ns));
     if (!recorded.was_active && failure.empty() && stop_requested == 0)
-      failure = never_active(stepper.pipeline().output(), experiment, summary.duration_s());
+      failure =
+          never_active(pipeline.output(), experiment.safety.good_frames, summary.duration_s());
+    if (recorded.was_active && !recorded.active)
+      warning = fmt::format("softarm: warning: at the end the arm is {}; it left ACTIVE for {}\n",
+                            name(pipeline.output().mode), name(recorded.left));
     timing.histograms = {{"tick_us", stepper.tick_times().counts(), stepper.tick_times().max_us()}};
     files.write(summary.json(), timing_json(timing));
   };
@@ -142,6 +149,7 @@ int run(const RunOptions& options) {
     failure = fmt::format("stopped after {:.3g} of {:.3g} s", summary.duration_s(), duration_s);
   else if (options.plots)
     draw_plots(options.out);
+  say(warning);
   if (!failure.empty()) print_error("softarm", failure);
   if (logged) {
     const LogTimeline& timeline = logged->timeline();
@@ -175,13 +183,14 @@ void add_run_command(CLI::App& app) {
   command
       ->add_option("--law", options->law,
                    "control by this Python class, MODULE:CLASS or FILE.py:CLASS (softarm.law)")
+      ->check(law_name())
       ->excludes(log);
   add_learned_option(*command, options->learned);
   command->add_flag("!--no-plots", options->plots, "do not draw the plots");
   auto* seed = command
                    ->add_option("--seed", options->seed,
                                 "seed of noise and dropouts (default: the configuration's)")
-                   ->check(CLI::NonNegativeNumber);
+                   ->check(seed_number());
   command->callback([options, seed] {
     options->has_seed = seed->count() > 0;
     if (const int code = run(*options); code != kExitOk) throw CLI::RuntimeError(code);

@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/LU>
+#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 
@@ -14,6 +14,10 @@
 
 namespace softarm {
 namespace {
+
+/// Of a force along the straight arm, as of an arm that lies, nothing is in a disturbance. Directions
+/// with less than this part of the other one's leverage have no load.
+constexpr double kLeastLeverage = 0.1;
 
 /// The horizontal load of every segment that this disturbance (2n, N m) amounts to on the straight
 /// arm, 2 x n; what is constant of it is one that is not learnt yet.
@@ -28,7 +32,9 @@ Eigen::Matrix2Xd load_of(const ArmParameters& arm_as_it_is, ConstVectorRef distu
   for (int i = 0; i < n; ++i) {
     Eigen::Matrix2d rows;
     rows << along_x.segment<2>(2 * i), along_y.segment<2>(2 * i);
-    load.col(i) = -rows.inverse() * disturbance_nm.segment<2>(2 * i);
+    Eigen::JacobiSVD<Eigen::Matrix2d> svd(rows, Eigen::ComputeFullU | Eigen::ComputeFullV);
+    svd.setThreshold(kLeastLeverage);
+    load.col(i) = -svd.solve(Eigen::Vector2d(disturbance_nm.segment<2>(2 * i)));
   }
   return load;
 }

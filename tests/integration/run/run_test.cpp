@@ -122,6 +122,16 @@ TEST_F(Run, AnArmThatWasNeverActiveIsAFailureWithItsReason) {
   EXPECT_TRUE(std::filesystem::exists(folder / "out" / "summary.json"));
 }
 
+TEST_F(Run, AnArmThatAFaultHasStoppedIsNamed) {
+  const std::string wild = write(
+      "wild.yaml", "include: " + kPaperArm + "\nname: wild\ncontrol: {kp_nm_per_rad: 10000}\n");
+  const std::string out = (folder / "out").string();
+  EXPECT_EQ(start("softarm", {"run", wild, "--duration", "3", "--no-plots", "--out", out}), 0);
+  EXPECT_NE(printed.find("; it left ACTIVE for soft_limit"), std::string::npos) << printed;
+  EXPECT_EQ(start("softarm", {"run", kPaperArm, "--duration", "1", "--no-plots", "--out", out}), 0);
+  EXPECT_EQ(printed.find("warning"), std::string::npos) << printed;
+}
+
 TEST_F(Run, WrongCommandLinesExitWith64) {
   const std::vector<std::vector<std::string>> wrong{
       {},
@@ -132,6 +142,11 @@ TEST_F(Run, WrongCommandLinesExitWith64) {
       {"run", kPaperArm, "--duration", "soon"},
       {"run", kPaperArm, "--seed", "x"},
       {"run", kPaperArm, "--seed", "-1"},
+      {"run", kPaperArm, "--law", "a_file.py"},
+      {"identify", kPaperArm, "--seeds", "2", "--log", "x.lcm"},
+      {"identify", kPaperArm, "--log", "x.lcm", "--from", "nan"},
+      {"identify", kPaperArm, "--log", "x.lcm", "--to", "-5"},
+      {"identify", kPaperArm, "--log", "x.lcm", "--skip", "nan"},
       {"jog", kPaperArm, "1", "1", "nan"},
       {"check", kPaperArm, "--live", "--pulse", "--hold", "nan"}};
   for (const auto& arguments : wrong) EXPECT_EQ(start("softarm", arguments), 64) << printed;
@@ -176,6 +191,20 @@ TEST_F(Run, AnUnknownOptionIsNamedWhateverElseIsMissing) {
   }
 }
 
+TEST_F(Run, WhatAnOptionMayBeIsNamed) {
+  const std::vector<std::pair<std::vector<std::string>, std::string>> wrong{
+      {{"run", kPaperArm, "--seed", "-1"},
+       "--seed: expected a whole number in [0, 9007199254740992]"},
+      {{"run", kPaperArm, "--law", "a_file.py"}, "--law: expected MODULE:CLASS or FILE.py:CLASS"},
+      {{"identify", kPaperArm, "--gains", "side by side"},
+       "--gains: expected one of arm, chamber, segment, side"},
+      {{"jog", kPaperArm, "0", "1", "0.1"}, "1 to 128"}};
+  for (const auto& [arguments, text] : wrong) {
+    EXPECT_EQ(start("softarm", arguments), 64);
+    EXPECT_NE(printed.find(text), std::string::npos) << printed;
+  }
+}
+
 TEST_F(Run, WrongConfigurationsExitWith78AndSayWhere) {
   const std::string missing = (folder / "missing.yaml").string();
   const std::string unknown =
@@ -197,6 +226,13 @@ TEST_F(Run, WrongConfigurationsExitWith78AndSayWhere) {
     EXPECT_NE(printed.find(broken + ":"), std::string::npos) << printed;
   }
   EXPECT_FALSE(std::filesystem::exists(folder / "out")) << "nothing is begun";
+  EXPECT_EQ(start("softarm", {"eval", folder.path().string()}), 78);
+  EXPECT_NE(printed.find("expected a file, got a folder"), std::string::npos) << printed;
+}
+
+TEST_F(Run, WithoutAKnownRecordingNothingWasMeasured) {
+  EXPECT_EQ(start("softarm-dev", {"bench", "recordings", folder.path().string()}), 1);
+  EXPECT_NE(printed.find("expected a recording that is known"), std::string::npos) << printed;
 }
 
 TEST_F(Run, AFolderThatCannotBeMadeIsAnError) {
