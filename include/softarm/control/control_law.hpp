@@ -34,8 +34,8 @@ namespace softarm {
 
 struct ControllerSettings;
 
-/// The estimated state that a law acts on: 2n numbers each, 3n where segments stretch, of the instant at which its command
-/// acts.
+/// The estimated state that a law acts on: 2n numbers each, 3n where segments stretch, of the
+/// instant at which its command acts.
 struct LawState {
   const SegmentVector& u_rad;
   const SegmentVector& velocity_radps;
