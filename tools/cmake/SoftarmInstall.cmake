@@ -12,7 +12,7 @@ configure_package_config_file(${CMAKE_CURRENT_LIST_DIR}/softarmConfig.cmake.in $
   INSTALL_DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/softarm)
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/softarmConfigVersion.cmake COMPATIBILITY SameMinorVersion)
 install(FILES ${PROJECT_BINARY_DIR}/softarmConfig.cmake ${PROJECT_BINARY_DIR}/softarmConfigVersion.cmake
-  ${PROJECT_SOURCE_DIR}/tools/cmake/SoftarmLcm.cmake ${PROJECT_SOURCE_DIR}/tools/cmake/SoftarmModbus.cmake
+  ${PROJECT_SOURCE_DIR}/tools/cmake/SoftarmPlainLibraries.cmake
   DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/softarm)
 install(PROGRAMS tools/plot_run.py tools/plot_identification.py DESTINATION ${CMAKE_INSTALL_DATADIR}/softarm)
 install(FILES tests/golden/golden.json DESTINATION ${CMAKE_INSTALL_DATADIR}/softarm)
