@@ -141,7 +141,8 @@ class Checks {
     no(experiment_.actuation.plane_rad.has_value(), "actuation.plane_rad");
     no(experiment_.control.coordinates == ControlCoordinates::polar, "control.coordinates: polar");
     no(!experiment_.control.law.get_if<CurvatureLaw>() &&
-           !experiment_.control.law.get_if<StaticsPiLaw>(),
+           !experiment_.control.law.get_if<StaticsPiLaw>() &&
+           !experiment_.control.law.get_if<ExternalLaw>(),
        "a control.law that knows no axial force");
     for (const ReferencePhase& phase : experiment_.reference.phases)
       no(phase.kind.get_if<LiveTipReference>() != nullptr, "reference: live_tip");

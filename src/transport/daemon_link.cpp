@@ -195,7 +195,7 @@ void DaemonLink::take_law(const ReceivedMessage& packet) noexcept {
   const bool forgotten = age_ns(now_ns_, newest_law_ns_) > kNumberForgotten_ns;
   if (sequence <= law_sequence_ && !forgotten) return refuse(LawVerdict::out_of_order);
   using Command = softarm_messages::law_command_t;
-  const auto expected = answer == Command::FORCE       ? dof_
+  const auto expected = answer == Command::FORCE       ? int{messages_.law_state.dimension}
                         : answer == Command::PRESSURES ? std::ssize(messages_.status.pressure_bar)
                                                        : -1;
   if (count != expected) return refuse(LawVerdict::wrong_size);

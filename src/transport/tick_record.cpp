@@ -85,7 +85,7 @@ tick_record_t largest_record(const PipelineSettings& settings, const std::string
   record.num_tip = 6;
   record.tip_target.resize(6);
   if (settings.control.law.get_if<ExternalLaw>() != nullptr) {
-    record.law_value.resize(std::max(dof, chambers));
+    record.law_value.resize(std::max(static_cast<std::size_t>(settings.arm.dof()), chambers));
     record.num_law = static_cast<std::int16_t>(record.law_value.size());
   }
   record.build = build;

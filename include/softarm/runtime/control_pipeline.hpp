@@ -52,11 +52,12 @@ struct LawInput {
   std::int64_t arrival_ns = kNever;
   std::int64_t validity_ns = 0;  ///< from state_ns on
   LawAnswer answer = LawAnswer::force;
-  PressureVector values;  ///< tau_u, 2n, N m; or a pressure a chamber, bar
+  PressureVector
+      values;  ///< tau_u, N m, as many as u_rad of the request; or a pressure a chamber, bar
 };
 
-/// What an external law is to answer: 2n numbers each, of the middle of the period in which an
-/// answer to it acts that comes in time for the next tick.
+/// What an external law is to answer: 2n numbers each (3n where segments stretch), of the middle of
+/// the period in which an answer to it acts that comes in time for the next tick.
 struct LawView {
   double active_s = 0.0;  ///< since the arm became ACTIVE; 0 where it is not
   SegmentVector u_rad, velocity_radps;

@@ -3,6 +3,7 @@
 
 #include "softarm/config/config_error.hpp"
 #include "softarm/config/load.hpp"
+#include "softarm/control/control_laws.hpp"
 #include "unit/config/config_files.hpp"
 
 namespace softarm {
@@ -143,6 +144,9 @@ TEST(PlantKeys, SegmentsThatStretch) {
   controlled.insert(controlled.find("{segments: 3") + 1, "extensible: true, ");
   const Experiment both = load_experiment(folder.write("c.yaml", controlled));
   EXPECT_TRUE(both.arm.extensible && both.plant.arm.extensible);
+  const Experiment own = load_experiment(
+      folder.write("own.yaml", "include: c.yaml\nname: own\ncontrol: {law: external}\n"));
+  EXPECT_TRUE(own.arm.extensible && own.control.law.get_if<ExternalLaw>() != nullptr);
   controlled.insert(controlled.find("control: {") + 10, "coordinates: polar, ");
   try {
     load_experiment(folder.write("c.yaml", controlled));

@@ -612,6 +612,36 @@ TEST_F(ExternalLawOverUdp, WhatIsOldForeignOrOfAnotherSizeIsRefusedAndCounted) {
   EXPECT_TRUE(collect_until(came));
 }
 
+/// Where segments stretch the force has three numbers a segment.
+class StretchingLawOverUdp : public ExternalLawOverUdp {
+ protected:
+  void SetUp() override {
+    settings.arm.extensible = true;
+    for (SegmentParameters& segment : settings.arm.segments) {
+      segment.axial_stiffness_n_per_m = 4000.0;
+      segment.axial_damping_ns_per_m = 185.0;
+    }
+    for (auto& chambers : settings.actuation.segments)
+      for (Chamber& chamber : chambers) chamber.offset_m = 0.0125;
+    ExternalLawOverUdp::SetUp();
+  }
+};
+
+TEST_F(StretchingLawOverUdp, ItsForceHasAsManyNumbersAsTheState) {
+  const std::string& channel = transport.lcm.law_channel;
+  law_command_t message = answer(1);
+  sender->publish(channel, message);
+  EXPECT_TRUE(nothing_comes(came));
+  EXPECT_EQ(refused(LawVerdict::wrong_size), 1);
+  message = answer(2);
+  message.num_values = 9;
+  message.value = test::numbers<double>(9, 0.25);
+  sender->publish(channel, message);
+  EXPECT_TRUE(collect_until([&](const TickInput& input) {
+    return came(input) && input.law->values.size() == 9 && input.law->values[8] == 2.25;
+  }));
+}
+
 TEST_F(ExternalLawOverUdp, ATargetOfTheTipComesOnceAndInOrder) {
   tip_target_t target = test::example<tip_target_t>(3, 4);
   const std::string& channel = transport.lcm.tip_channel;
