@@ -52,8 +52,8 @@ struct LawInput {
   std::int64_t arrival_ns = kNever;
   std::int64_t validity_ns = 0;  ///< from state_ns on
   LawAnswer answer = LawAnswer::force;
-  PressureVector
-      values;  ///< tau_u, N m, as many as u_rad of the request; or a pressure a chamber, bar
+  /// tau_u, N m, as many as u_rad of the request; or a pressure a chamber, bar.
+  PressureVector values;
 };
 
 /// What an external law is to answer: 2n numbers each (3n where segments stretch), of the middle of
