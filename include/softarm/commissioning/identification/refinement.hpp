@@ -19,6 +19,7 @@ struct RefinementOptions {
   /// false: all components have the same weight, so that the RMS is minimised (without a prior).
   bool weighted = true;
   int threads = 1;
+  bool intervals = true;  ///< false: without covariance and singular values
   /// A round that lowers the cost by less, in squared standard errors, is the last.
   double least_gain = 1e-4;
   std::function<void(const std::string&)> progress;  ///< may be empty
