@@ -180,10 +180,10 @@ class Search {
     for (int weighting = 0; weighting < kWeightings; ++weighting) {
       const double before = whiten_.size() > 0 ? whiten_.squaredNorm() / inflation_ : 0.0;
       whiten_ = whitener(measured_ - u, options_.weighted);
-      // From the first on, or the prior would count for nothing beside frames that say the same.
-      inflation_ = variance_inflation((measured_ - u).transpose());
+      inflation_ =
+          weighting == 0 && !options_.near ? 1.0 : variance_inflation((measured_ - u).transpose());
       const double now = whiten_.squaredNorm() / inflation_;
-      if (!options_.weighted && std::abs(now - before) < kSameWeight * before) break;
+      if (options_.near && std::abs(now - before) < kSameWeight * before) break;
       out.converged = slow_ = false;
       length_ = std::numeric_limits<double>::infinity();
       while (out.rounds < options_.most_rounds && !out.converged) {

@@ -8,6 +8,7 @@
 #include <limits>
 #include <map>
 #include <mutex>
+#include <optional>
 #include <stdexcept>
 #include <utility>
 
@@ -52,7 +53,7 @@ constexpr double kPriors[] = {2.0, 0.5, 0.25};  ///< tried at the end, times tha
 constexpr double kLeastGain = 0.05;             ///< of a search, in squared standard errors
 constexpr int kRevisions = 3;                   ///< rounds over all terms after the first
 constexpr int kMostExchanges = 2;
-constexpr std::size_t kExchangesTried = 6;    ///< those with the best forecasts
+constexpr std::size_t kExchangesTried = 6;    ///< of each order
 constexpr double kEqual = 1e-6;               ///< relative; errors that differ by less are equal
 constexpr double kSofterBeyond = 1.25;        ///< times the bends that were recorded
 constexpr double kRadii[] = {0.3, 1.0, 2.5};  ///< of slip springs, of the motion's RMS
@@ -77,6 +78,7 @@ struct Move {
   FitChoice choice;
   double prior = 1.0;
   const Attempt* near = nullptr;  ///< where its search starts
+  const Attempt* also = nullptr;  ///< or here, where that is nearer; may be none
 };
 
 int terms_of(const FitChoice& choice) {
@@ -104,7 +106,7 @@ class Selection {
   SelectedModel run(const FitChoice& plain) {
     given_ = plain;
     const double prior = options_.identify.refinement.prior;
-    best_ = attempt({"plain", plain, prior, nullptr}, options_.identify.refinement.threads);
+    best_ = attempt({"plain", plain, prior}, options_.identify.refinement.threads);
     best_.trial.kept = true;
     trials_.push_back(best_.trial);
     if (!std::isfinite(best_.trial.unseen))
@@ -132,6 +134,7 @@ class Selection {
     const ParameterSet set = unknowns(out.choice);
     IdentifyOptions search = options_.identify;
     search.refinement.prior = out.prior;
+    search.refinement.near = !out.choice.elongation;
     out.whole = find(set, records_, search, best_.arms);
     out.arm = set.arm(out.whole.x);
     out.by_fold = std::move(best_.arms);
@@ -225,39 +228,62 @@ class Selection {
     return out;
   }
 
-  /// One term for one or two others, in the order of what the sensitivities of this model forecast.
-  std::vector<Move> exchanges() const {
-    std::vector<std::pair<double, Move>> ranked;
-    try {
-      const ParameterSet all = unknowns(all_terms());
-      const ExchangeForecast forecast(all, folds_, best_.arms, best_.prior,
-                                      options_.identify.refinement.threads);
-      const auto consider = [&](const std::string& name, const FitChoice& choice) {
-        Attempt it{choice, best_.prior, {}, {}};
-        it.trial.unseen = forecast.unseen_rad(unknowns(choice));
-        ranked.emplace_back(price(it), Move{name, choice, best_.prior, &best_});
-      };
-      for (const Term& in : kOfBend) {
-        if (!applies(in, best_.choice)) continue;
-        const FitChoice added = with(best_.choice, in, true);
-        for (const Term& out : kOfBend) {
-          if (&in == &out || !may_go(out, added)) continue;
-          const FitChoice one = with(added, out, false);
-          const std::string name = fmt::format("{} for {}", in.name, out.name);
-          consider(name, one);
-          for (const Term* also = &out + 1; also != std::end(kOfBend); ++also)
-            if (also != &in && may_go(*also, one))
-              consider(fmt::format("{}, {}", name, also->name), with(one, *also, false));
-        }
-      }
-    } catch (const std::runtime_error&) {
-      return {};  // no bounded response next to this model
-    }
+  using Ranked = std::vector<std::pair<double, Move>>;
+
+  /// The first few of `ranked` that `out` does not have.
+  static void append_best(Ranked ranked, std::vector<Move>& out) {
     std::stable_sort(ranked.begin(), ranked.end(),
                      [](const auto& a, const auto& b) { return a.first < b.first; });
+    if (ranked.size() > kExchangesTried) ranked.resize(kExchangesTried);
+    for (auto& [promise, move] : ranked) {
+      const auto same = [&name = move.name](const Move& it) { return it.name == name; };
+      if (std::none_of(out.begin(), out.end(), same)) out.push_back(std::move(move));
+    }
+  }
+
+  /// One term for one or two others: those of the best forecast from the sensitivities of this model,
+  /// and those that promise most if what single steps did were to add up.
+  std::vector<Move> exchanges() const {
+    Ranked forecast, added_up;
+    std::optional<ParameterSet> all;
+    std::optional<ExchangeForecast> sensitivities;
+    try {
+      all.emplace(unknowns(all_terms()));
+      sensitivities.emplace(*all, folds_, best_.arms, best_.prior,
+                            options_.identify.refinement.threads);
+    } catch (const std::runtime_error&) {
+      sensitivities.reset();  // no bounded response next to this model
+    }
+    for (const Term& in : kOfBend) {
+      const auto it = tried_.find(in.name);
+      if (!applies(in, best_.choice)) continue;
+      const Attempt* const added = it == tried_.end() ? nullptr : &it->second;
+      const auto consider = [&](const std::string& name, const FitChoice& choice) {
+        if (!sensitivities) return;
+        Attempt guess{choice, best_.prior, {}, {}};
+        guess.trial.unseen = sensitivities->unseen_rad(unknowns(choice));
+        if (std::isfinite(price(guess)))
+          forecast.emplace_back(price(guess), Move{name, choice, best_.prior, &best_, added});
+      };
+      const FitChoice both = with(best_.choice, in, true);
+      for (const Term& out : kOfBend) {
+        if (&in == &out || !may_go(out, both)) continue;
+        const FitChoice one = with(both, out, false);
+        const std::string name = fmt::format("{} for {}", in.name, out.name);
+        consider(name, one);
+        for (const Term* also = &out + 1; also != std::end(kOfBend); ++also)
+          if (also != &in && may_go(*also, one))
+            consider(fmt::format("{}, {}", name, also->name), with(one, *also, false));
+        const auto left = tried_.find(out.name);
+        if (added == nullptr || left == tried_.end()) continue;
+        const double promise = price(*added) + price(left->second);
+        if (std::isfinite(promise))
+          added_up.emplace_back(promise, Move{name, one, best_.prior, &best_, added});
+      }
+    }
     std::vector<Move> out;
-    for (auto& [promise, move] : ranked)
-      if (out.size() < kExchangesTried) out.push_back(std::move(move));
+    append_best(std::move(forecast), out);
+    append_best(std::move(added_up), out);
     return out;
   }
 
@@ -311,6 +337,7 @@ class Selection {
     search.refinement.prior = move.prior;
     search.refinement.threads = std::max(1, threads / parts);
     search.refinement.intervals = false;
+    search.refinement.near = !move.choice.elongation;
     search.refinement.progress = [this](const std::string& text) {
       const std::lock_guard lock(reporting_);
       if (options_.identify.refinement.progress) options_.identify.refinement.progress(text);
@@ -318,7 +345,8 @@ class Selection {
     in_parallel(parts, threads, [&](int part) {
       const auto i = static_cast<std::size_t>(part);
       std::vector<ArmHypothesis> near;
-      if (move.near != nullptr) near.push_back(move.near->arms[i]);
+      for (const Attempt* from : {move.near, move.also})
+        if (from != nullptr) near.push_back(from->arms[i]);
       try {
         const Refinement fit = find(set, folds_[i].seen, search, near);
         out.arms[i] = set.arm(fit.x);
