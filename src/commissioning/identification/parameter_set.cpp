@@ -17,7 +17,7 @@ constexpr double kLagScale_s = 0.1, kDelayScale_s = 0.05, kRestScale_rad = 0.1;
 constexpr double kFill_s = 0.1, kVent_s = 0.3;  ///< where no lag is configured, the prior's
 constexpr double kLongest_s = 10.0;             ///< lag of a chamber
 constexpr double kSaturation_1pbar = 0.5, kMostSaturation_1pbar = 2.0, kStiffening_1pbar = 0.5;
-constexpr double kSlip = 0.1, kSlipScale = 0.3;         ///< of k, a slip spring
+constexpr double kSlipShare = 0.1, kSlipScale = 0.3;    ///< of k, a slip spring
 constexpr double kRemanent = 0.2, kRemanence_s = 20.0;  ///< share and time
 constexpr double kSecondRemanence_s = 5.0, kSoonest_s = 0.3, kLatest_s = 30.0;
 constexpr double kRemanentScale_rad = 0.05, kCross = 0.15;
@@ -26,6 +26,7 @@ constexpr double kSet = 0.2, kByBend_m_per_rad2 = 0.02;
 constexpr double kLeastLoad_kg = 1e-3;  ///< scale of a load
 constexpr double kCoarse = 1e-3;        ///< difference for what makes kinks
 
+constexpr const char* kCubicName = "cubic stiffness";
 constexpr double kUnbounded = -std::numeric_limits<double>::infinity();
 
 double positive(double value, double otherwise) { return value > 0.0 ? value : otherwise; }
@@ -157,7 +158,7 @@ void ParameterSet::add_times(const FitChoice& choice) {
            [=](ArmHypothesis& arm, double value) { arm.rest_rad[c] = value; }, kUnbounded});
   if (choice.cubic)
     number(
-        "cubic stiffness", "N m/rad^3",
+        kCubicName, "N m/rad^3",
         positive(start_.arm.segments[0].stiffness_nm_per_rad, 1.0) / (kHardens_rad * kHardens_rad),
         &ArmHypothesis::cubic_nm_per_rad3, kUnbounded);
   const bool lags = choice.venting || choice.chamber_lags;
@@ -246,7 +247,7 @@ void ParameterSet::add_memory(const FitChoice& choice) {
             if (arm.slip_springs.size() != springs.size()) arm.slip_springs = springs;
             arm.slip_springs[i].stiffness_nm_per_rad = value;
           },
-          0.0, inf, start_.slip_springs[i].stiffness_nm_per_rad > 0.0 ? none : kSlip * k);
+          0.0, inf, start_.slip_springs[i].stiffness_nm_per_rad > 0.0 ? none : kSlipShare * k);
   if (choice.stiffening)
     number(
         "stiffening", "1/bar", kStiffening_1pbar,
@@ -481,6 +482,14 @@ bool ParameterSet::possible(const Eigen::VectorXd& x) const {
       });
   // Both rests together follow the bend by less than all of it: there is stiffness left in the end.
   return springs && tried.lag_s >= 0.0 && tried.remanence.share + tried.remanence_2.share < 0.95;
+}
+
+void ParameterSet::stay_stiff_to(double bend_rad) {
+  double k = std::numeric_limits<double>::infinity();
+  for (const SegmentParameters& segment : start_.arm.segments)
+    k = std::min(k, segment.stiffness_nm_per_rad);
+  for (Parameter& each : parameters_)
+    if (each.name == kCubicName) each.lowest = -k / (3.0 * bend_rad * bend_rad);
 }
 
 bool ParameterSet::linear(Eigen::Index i) const { return (*this)[i].linear; }

@@ -19,6 +19,7 @@ namespace {
 constexpr double kHeldAbove = 1.0;  ///< standard error of a combination that is not determined
 constexpr double kNoiseFloor_rad = 1e-9;  ///< no motion capture is better
 constexpr int kWeightings = 3;
+constexpr double kSameWeight = 0.1;    ///< of data beside the prior: the next would change nothing
 constexpr double kStillStable = 0.75;  ///< of the longest step, which is short of the stable one
 constexpr double kSlowAdvance = 0.3;   ///< steps that shorten less need new sensitivities
 constexpr double kNear = 0.02;         ///< sensitivities of a point so near serve for intervals
@@ -177,8 +178,12 @@ class Search {
     step_s_ = comparison_.response(out.x, u);
     double damping = 1e-6;
     for (int weighting = 0; weighting < kWeightings; ++weighting) {
+      const double before = whiten_.size() > 0 ? whiten_.squaredNorm() / inflation_ : 0.0;
       whiten_ = whitener(measured_ - u, options_.weighted);
-      inflation_ = weighting == 0 ? 1.0 : variance_inflation((measured_ - u).transpose());
+      inflation_ =
+          weighting == 0 && !options_.near ? 1.0 : variance_inflation((measured_ - u).transpose());
+      const double now = whiten_.squaredNorm() / inflation_;
+      if (options_.near && std::abs(now - before) < kSameWeight * before) break;
       out.converged = slow_ = false;
       length_ = std::numeric_limits<double>::infinity();
       while (out.rounds < options_.most_rounds && !out.converged) {
@@ -186,7 +191,7 @@ class Search {
         if (!improve(out, u, damping)) break;
       }
     }
-    finish(out, u);
+    if (options_.intervals) finish(out, u);
     return u;
   }
 

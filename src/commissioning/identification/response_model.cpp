@@ -20,8 +20,8 @@ namespace {
 
 constexpr double kLargest_rad = 20.0;     ///< a response beyond it is not that of an arm
 constexpr double kFastest_1ps = 40000.0;  ///< beyond it a simulation takes too long
-constexpr double kStep = 2.0;         ///< times the fastest mode's time constant; stable below 2.78
-constexpr double kSlowStep_s = 0.05;  ///< without inertia: what follows valves and tubes
+constexpr double kStep = 2.0;        ///< times the fastest mode's time constant; stable below 2.78
+constexpr double kSlowStep_s = 0.1;  ///< without inertia: what follows valves and tubes
 
 ArmHypothesis hypothesis(const ArmParameters& arm, const ActuationSettings& actuation) {
   ArmHypothesis out;

@@ -6,7 +6,14 @@
 #include <chrono>
 #include <cmath>
 #include <limits>
+#include <map>
+#include <mutex>
+#include <optional>
 #include <stdexcept>
+#include <utility>
+
+#include "commissioning/identification/exchange_forecast.hpp"
+#include "commissioning/identification/parallel.hpp"
 
 namespace softarm {
 namespace {
@@ -44,8 +51,12 @@ constexpr Term kOfElongation[] = {
 };
 constexpr double kPriors[] = {2.0, 0.5, 0.25};  ///< tried at the end, times that given
 constexpr double kLeastGain = 0.05;             ///< of a search, in squared standard errors
-constexpr int kRevisions = 2;                   ///< rounds over all terms after the first
-constexpr double kRadii[] = {0.3, 1.0, 2.5};    ///< of slip springs, of the motion's RMS
+constexpr int kRevisions = 3;                   ///< rounds over all terms after the first
+constexpr int kMostExchanges = 2;
+constexpr std::size_t kExchangesTried = 6;    ///< of each order
+constexpr double kEqual = 1e-6;               ///< relative; errors that differ by less are equal
+constexpr double kSofterBeyond = 1.25;        ///< times the bends that were recorded
+constexpr double kRadii[] = {0.3, 1.0, 2.5};  ///< of slip springs, of the motion's RMS
 
 /// RMS of a component of the motion about its mean.
 double motion_rms(const Eigen::MatrixXd& rows) {
@@ -55,9 +66,26 @@ double motion_rms(const Eigen::MatrixXd& rows) {
 
 /// One choice in every fold.
 struct Attempt {
+  FitChoice choice;
+  double prior = 1.0;
   TermTrial trial;
   std::vector<ArmHypothesis> arms;
 };
+
+/// A model next to another one.
+struct Move {
+  std::string name;
+  FitChoice choice;
+  double prior = 1.0;
+  const Attempt* near = nullptr;  ///< where its search starts
+  const Attempt* also = nullptr;  ///< or here, where that is nearer; may be none
+};
+
+int terms_of(const FitChoice& choice) {
+  const auto there = [&](const Term& term) { return choice.*term.flag; };
+  return static_cast<int>(std::count_if(std::begin(kOfBend), std::end(kOfBend), there)) +
+         choice.set + choice.by_bend;
+}
 
 class Selection {
  public:
@@ -65,45 +93,52 @@ class Selection {
             const std::vector<Fold>& folds, const SelectionOptions& options)
       : start_(start), kind_(kind), records_(records), folds_(folds), options_(options) {
     double rms = 0.0;
-    for (const MotionRecord& record : records) rms = std::max(rms, motion_rms(record.u_rad));
+    for (const MotionRecord& record : records) {
+      rms = std::max(rms, motion_rms(record.u_rad));
+      for (Eigen::Index i = 0; i < record.u_rad.cols(); i += 2)
+        reach_rad_ =
+            std::max(reach_rad_, record.u_rad.middleCols<2>(i).rowwise().norm().maxCoeff());
+    }
     if (start_.slip_springs.empty())
       for (const double radius : kRadii) start_.slip_springs.push_back({radius * rms, 0.0});
   }
 
   SelectedModel run(const FitChoice& plain) {
-    SelectedModel out;
-    out.choice = given_ = plain;
-    out.prior = options_.identify.refinement.prior;
-    Attempt best = attempt("plain", out.choice, out.prior, nullptr);
-    best.trial.kept = true;
-    out.trials.push_back(best.trial);
-    if (!std::isfinite(best.trial.unseen))
+    given_ = plain;
+    const double prior = options_.identify.refinement.prior;
+    best_ = attempt({"plain", plain, prior}, options_.identify.refinement.threads);
+    best_.trial.kept = true;
+    trials_.push_back(best_.trial);
+    if (!std::isfinite(best_.trial.unseen))
       throw std::runtime_error("the plain model has no bounded response to these records");
-    const auto consider = [&](const char* name, const FitChoice& choice, double prior) {
-      Attempt tried = attempt(name, choice, prior, &best);
-      tried.trial.kept = tried.trial.unseen < (1.0 - options_.least_gain) * best.trial.unseen;
-      out.trials.push_back(tried.trial);
-      if (!tried.trial.kept) return;
-      out.choice = choice;
-      out.prior = prior;
-      best = std::move(tried);
-    };
     if (plain.elongation) {
-      add_best(out, best);
+      while (keep_best(additions())) {
+      }
     } else {
       for (const Term& term : kOfBend)
-        if (applies(term, out.choice)) consider(term.name, with(out.choice, term), out.prior);
-      revise(out, best);
+        if (applies(term, best_.choice)) step(term);
+      for (int exchanged = 0; exchanged <= kMostExchanges; ++exchanged) {
+        revise();
+        if (exchanged == kMostExchanges || !keep_best(exchanges())) break;
+      }
     }
-    const double given = out.prior;
-    if (given > 0.0)
-      for (const double part : kPriors)
-        consider(fmt::format("prior of {:.0f} %", 100.0 * part * given).c_str(), out.choice,
-                 part * given);
-    const ParameterSet set(start_, kind_, out.choice);
-    out.whole = find(set, records_, out.prior, best.arms);
+    std::vector<Move> priors;
+    for (const double part : kPriors)
+      if (prior > 0.0)
+        priors.push_back({fmt::format("prior of {:.0f} %", 100.0 * part * prior), best_.choice,
+                          part * prior, &best_});
+    keep_best(priors);
+    SelectedModel out;
+    out.choice = best_.choice;
+    out.prior = best_.prior;
+    const ParameterSet set = unknowns(out.choice);
+    IdentifyOptions search = options_.identify;
+    search.refinement.prior = out.prior;
+    search.refinement.near = !out.choice.elongation;
+    out.whole = find(set, records_, search, best_.arms);
     out.arm = set.arm(out.whole.x);
-    out.by_fold = std::move(best.arms);
+    out.by_fold = std::move(best_.arms);
+    out.trials = std::move(trials_);
     return out;
   }
 
@@ -116,113 +151,226 @@ class Selection {
     return term.flag != &FitChoice::cross || start_.arm.size() > 1;
   }
 
-  static FitChoice with(FitChoice choice, const Term& term) {
-    choice.*term.flag = true;
-    return choice;
-  }
-  static FitChoice without(FitChoice choice, const Term& term) {
-    choice.*term.flag = false;
-    return choice;
-  }
-
-  /// Whether the model would be another without a term that it has.
-  static bool counts(const Term& term, const FitChoice& choice) {
+  /// Whether a term may go: it was not asked for, and the model would be another without it.
+  bool may_go(const Term& term, const FitChoice& choice) const {
+    if (!(choice.*term.flag) || given_.*term.flag) return false;
     if (term.flag == &FitChoice::one_saturation) return !choice.saturation;
     if (term.flag == &FitChoice::venting) return !choice.chamber_lags;
     return term.flag != &FitChoice::remanence || !choice.second_remanence;
   }
 
+  static FitChoice with(FitChoice choice, const Term& term, bool there) {
+    choice.*term.flag = there;
+    return choice;
+  }
+
+  /// What is to be lowered: every term has to be worth `least_gain`. As each move that is kept lowers
+  /// it, the search ends.
+  double price(const Attempt& it) const {
+    return std::log(it.trial.unseen) - terms_of(it.choice) * std::log(1.0 - options_.least_gain);
+  }
+  bool better(const Attempt& it, const Attempt& than) const {
+    if (!std::isfinite(it.trial.unseen)) return false;
+    const double gain = price(than) - price(it);
+    if (it.prior != than.prior) return gain > -std::log(1.0 - options_.least_gain);
+    return gain > kEqual || (gain > -kEqual && it.trial.parameters < than.trial.parameters);
+  }
+
+  void keep(Attempt&& it) {
+    it.trial.kept = true;
+    trials_.push_back(it.trial);
+    best_ = std::move(it);
+    tried_.clear();
+  }
+
+  /// Adds one term, or leaves it out where it is there.
+  bool step(const Term& term) {
+    const bool there = best_.choice.*term.flag;
+    Attempt tried = attempt({(there ? "without " : "") + std::string(term.name),
+                             with(best_.choice, term, !there), best_.prior, &best_},
+                            options_.identify.refinement.threads);
+    if (better(tried, best_)) {
+      keep(std::move(tried));
+      return true;
+    }
+    trials_.push_back(tried.trial);
+    tried_[term.name] = std::move(tried);
+    return false;
+  }
+
   /// What a term is worth depends on those that came later: goes round again, leaves out what no
-  /// longer helps and adds what now does, until a round has changed nothing.
-  void revise(SelectedModel& out, Attempt& best) {
-    int unchanged = 0;
-    for (int k = 0; k < kRevisions * static_cast<int>(std::size(kOfBend)); ++k) {
-      const Term& term = kOfBend[static_cast<std::size_t>(k) % std::size(kOfBend)];
-      if (++unchanged > static_cast<int>(std::size(kOfBend))) return;
-      const bool there = out.choice.*term.flag;
-      if (there ? !counts(term, out.choice) || given_.*term.flag : !applies(term, out.choice))
-        continue;
-      const FitChoice choice = there ? without(out.choice, term) : with(out.choice, term);
-      Attempt tried =
-          attempt((there ? "without " : "") + std::string(term.name), choice, out.prior, &best);
-      const double most = (there ? 1.0 : 1.0 - options_.least_gain) * best.trial.unseen;
-      tried.trial.kept = tried.trial.unseen <= most;
-      out.trials.push_back(tried.trial);
-      if (!tried.trial.kept) continue;
-      out.choice = choice;
-      best = std::move(tried);
-      unchanged = 0;
+  /// longer helps and adds what now does, until no step is left that was not tried beside this model.
+  void revise() {
+    for (int round = 0; round < kRevisions; ++round) {
+      bool changed = false;
+      for (const Term& term : kOfBend) {
+        if (tried_.contains(term.name)) continue;
+        if (applies(term, best_.choice) || may_go(term, best_.choice))
+          changed = step(term) || changed;
+      }
+      if (!changed) return;
     }
   }
 
-  /// Again and again the best of the terms of the elongation that are left, as long as it gains.
-  void add_best(SelectedModel& out, Attempt& best) {
-    for (;;) {
-      std::vector<Attempt> tried;
-      std::vector<FitChoice> choices;
-      for (const Term& term : kOfElongation) {
-        if (!applies(term, out.choice)) continue;
-        choices.push_back(with(out.choice, term));
-        tried.push_back(attempt(term.name, choices.back(), out.prior, &best));
-      }
-      std::size_t least = 0;
-      for (std::size_t i = 1; i < tried.size(); ++i)
-        if (!std::isfinite(tried[least].trial.unseen) ||
-            tried[i].trial.unseen < tried[least].trial.unseen)
-          least = i;
-      const bool gains = !tried.empty() && tried[least].trial.unseen <
-                                               (1.0 - options_.least_gain) * best.trial.unseen;
-      if (!gains) {
-        for (const Attempt& each : tried) out.trials.push_back(each.trial);
-        return;
-      }
-      tried[least].trial.kept = true;
-      out.trials.push_back(tried[least].trial);
-      out.choice = choices[least];
-      best = std::move(tried[least]);
+  std::vector<Move> additions() const {
+    std::vector<Move> out;
+    for (const Term& term : kOfElongation)
+      if (applies(term, best_.choice))
+        out.push_back({term.name, with(best_.choice, term, true), best_.prior, &best_});
+    return out;
+  }
+
+  /// The model with every term that can be taken in.
+  FitChoice all_terms() const {
+    FitChoice out = best_.choice;
+    for (const Term& term : kOfBend)
+      if (applies(term, out)) out.*term.flag = true;
+    return out;
+  }
+
+  using Ranked = std::vector<std::pair<double, Move>>;
+
+  /// The first few of `ranked` that `out` does not have.
+  static void append_best(Ranked ranked, std::vector<Move>& out) {
+    std::stable_sort(ranked.begin(), ranked.end(),
+                     [](const auto& a, const auto& b) { return a.first < b.first; });
+    if (ranked.size() > kExchangesTried) ranked.resize(kExchangesTried);
+    for (auto& [promise, move] : ranked) {
+      const auto same = [&name = move.name](const Move& it) { return it.name == name; };
+      if (std::none_of(out.begin(), out.end(), same)) out.push_back(std::move(move));
     }
   }
 
-  Refinement find(const ParameterSet& set, std::span<const MotionRecord> records, double prior,
-                  const std::vector<ArmHypothesis>& near) const {
-    IdentifyOptions options = options_.identify;
-    options.refinement.prior = prior;
+  /// One term for one or two others: those of the best forecast from the sensitivities of this model,
+  /// and those that promise most if what single steps did were to add up.
+  std::vector<Move> exchanges() const {
+    Ranked forecast, added_up;
+    std::optional<ParameterSet> all;
+    std::optional<ExchangeForecast> sensitivities;
+    try {
+      all.emplace(unknowns(all_terms()));
+      sensitivities.emplace(*all, folds_, best_.arms, best_.prior,
+                            options_.identify.refinement.threads);
+    } catch (const std::runtime_error&) {
+      sensitivities.reset();  // no bounded response next to this model
+    }
+    for (const Term& in : kOfBend) {
+      const auto it = tried_.find(in.name);
+      if (!applies(in, best_.choice)) continue;
+      const Attempt* const added = it == tried_.end() ? nullptr : &it->second;
+      const auto consider = [&](const std::string& name, const FitChoice& choice) {
+        if (!sensitivities) return;
+        Attempt guess{choice, best_.prior, {}, {}};
+        guess.trial.unseen = sensitivities->unseen_rad(unknowns(choice));
+        if (std::isfinite(price(guess)))
+          forecast.emplace_back(price(guess), Move{name, choice, best_.prior, &best_, added});
+      };
+      const FitChoice both = with(best_.choice, in, true);
+      for (const Term& out : kOfBend) {
+        if (&in == &out || !may_go(out, both)) continue;
+        const FitChoice one = with(both, out, false);
+        const std::string name = fmt::format("{} for {}", in.name, out.name);
+        consider(name, one);
+        for (const Term* also = &out + 1; also != std::end(kOfBend); ++also)
+          if (also != &in && may_go(*also, one))
+            consider(fmt::format("{}, {}", name, also->name), with(one, *also, false));
+        const auto left = tried_.find(out.name);
+        if (added == nullptr || left == tried_.end()) continue;
+        const double promise = price(*added) + price(left->second);
+        if (std::isfinite(promise))
+          added_up.emplace_back(promise, Move{name, one, best_.prior, &best_, added});
+      }
+    }
+    std::vector<Move> out;
+    append_best(std::move(forecast), out);
+    append_best(std::move(added_up), out);
+    return out;
+  }
+
+  /// Tries all of them and keeps the best, if it is better than what there is.
+  bool keep_best(const std::vector<Move>& moves) {
+    const auto count = static_cast<int>(moves.size());
+    const int threads = options_.identify.refinement.threads;
+    std::vector<Attempt> tried(moves.size());
+    in_parallel(count, threads, [&](int i) {
+      const auto k = static_cast<std::size_t>(i);
+      tried[k] = attempt(moves[k], std::max(1, threads / std::max(1, count)));
+    });
+    Attempt* found = &best_;
+    for (Attempt& each : tried)
+      if (better(each, *found)) found = &each;
+    for (const Attempt& each : tried)
+      if (&each != found) trials_.push_back(each.trial);
+    if (found == &best_) return false;
+    Attempt kept = std::move(*found);
+    keep(std::move(kept));
+    return true;
+  }
+
+  static Refinement find(const ParameterSet& set, std::span<const MotionRecord> records,
+                         IdentifyOptions options, const std::vector<ArmHypothesis>& near) {
     options.refinement.least_gain = std::max(kLeastGain, options.refinement.least_gain);
     options.near.insert(options.near.end(), near.begin(), near.end());
     return identify(set, records, options);
   }
 
-  Attempt attempt(const std::string& name, const FitChoice& choice, double prior,
-                  const Attempt* simpler) const {
-    if (options_.progress) options_.progress(name);
+  ParameterSet unknowns(const FitChoice& choice) const {
+    ParameterSet out(start_, kind_, choice);
+    out.stay_stiff_to(kSofterBeyond * reach_rad_);
+    return out;
+  }
+
+  /// @param threads  for it; the result does not depend on them
+  Attempt attempt(const Move& move, int threads) const {
+    report(move.name);
     const auto begin = std::chrono::steady_clock::now();
-    const ParameterSet set(start_, kind_, choice);
-    Attempt out;
-    out.trial.name = name;
+    const ParameterSet set = unknowns(move.choice);
+    Attempt out{move.choice, move.prior, {}, {}};
+    out.trial.name = move.name;
     out.trial.parameters = set.size();
+    out.trial.unseen_of.assign(folds_.size(), std::numeric_limits<double>::quiet_NaN());
+    out.arms.assign(folds_.size(), start_);
+    if (move.near != nullptr) out.arms = move.near->arms;
+    std::vector<double> samples(folds_.size(), 0.0);
+    const auto parts = static_cast<int>(folds_.size());
+    IdentifyOptions search = options_.identify;
+    search.refinement.prior = move.prior;
+    search.refinement.threads = std::max(1, threads / parts);
+    search.refinement.intervals = false;
+    search.refinement.near = !move.choice.elongation;
+    search.refinement.progress = [this](const std::string& text) {
+      const std::lock_guard lock(reporting_);
+      if (options_.identify.refinement.progress) options_.identify.refinement.progress(text);
+    };
+    in_parallel(parts, threads, [&](int part) {
+      const auto i = static_cast<std::size_t>(part);
+      std::vector<ArmHypothesis> near;
+      for (const Attempt* from : {move.near, move.also})
+        if (from != nullptr) near.push_back(from->arms[i]);
+      try {
+        const Refinement fit = find(set, folds_[i].seen, search, near);
+        out.arms[i] = set.arm(fit.x);
+        const Refinement unseen = predict(set, folds_[i].unseen, fit.x);
+        out.trial.unseen_of[i] = unseen.rms_rad;
+        samples[i] = static_cast<double>(unseen.time_s.size());
+      } catch (const std::runtime_error&) {
+        // no bounded response: the error stays NaN
+      }
+    });
     double squares = 0.0, count = 0.0;
     for (std::size_t i = 0; i < folds_.size(); ++i) {
-      std::vector<ArmHypothesis> near;
-      if (simpler != nullptr) near.push_back(simpler->arms[i]);
-      double rms = std::numeric_limits<double>::quiet_NaN();
-      try {
-        const Refinement fit = find(set, folds_[i].seen, prior, near);
-        out.arms.push_back(set.arm(fit.x));
-        const Refinement unseen = predict(set, folds_[i].unseen, fit.x);
-        rms = unseen.rms_rad;
-        const auto samples = static_cast<double>(unseen.time_s.size());
-        squares += samples * rms * rms;
-        count += samples;
-      } catch (const std::runtime_error&) {
-        if (out.arms.size() == i) out.arms.push_back(simpler ? simpler->arms[i] : start_);
-        squares = std::numeric_limits<double>::quiet_NaN();
-      }
-      out.trial.unseen_of.push_back(rms);
+      squares += samples[i] * out.trial.unseen_of[i] * out.trial.unseen_of[i];
+      count += samples[i];
     }
     out.trial.unseen = std::sqrt(squares / count);
     out.trial.seconds =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
     return out;
+  }
+
+  void report(const std::string& what) const {
+    const std::lock_guard lock(reporting_);
+    if (options_.progress) options_.progress(what);
   }
 
   ArmHypothesis start_;
@@ -231,6 +379,11 @@ class Selection {
   std::span<const MotionRecord> records_;
   const std::vector<Fold>& folds_;
   const SelectionOptions& options_;
+  double reach_rad_ = 0.0;  ///< the farthest recorded bend
+  mutable std::mutex reporting_;
+  Attempt best_;
+  std::map<std::string, Attempt> tried_;  ///< single steps from `best_` that did not help
+  std::vector<TermTrial> trials_;
 };
 
 }  // namespace

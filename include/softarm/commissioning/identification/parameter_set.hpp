@@ -92,6 +92,9 @@ class ParameterSet {
   ArmHypothesis arm(const Eigen::VectorXd& x) const;
   /// Whether the arm is physically possible: no negative stiffness, damping or lag.
   bool possible(const Eigen::VectorXd& x) const;
+  /// Cubic stiffness may soften the springs only so far that they still are stiff at this bend: what
+  /// lets go there has no bounded response.
+  void stay_stiff_to(double bend_rad);
   /// Whether (16) is linear in this unknown.
   bool linear(Eigen::Index i) const;
 

@@ -19,6 +19,11 @@ struct RefinementOptions {
   /// false: all components have the same weight, so that the RMS is minimised (without a prior).
   bool weighted = true;
   int threads = 1;
+  /// true: the start is near. Correlated frames count as few from the first weighting on, so that the
+  /// prior has its weight, and the search ends when the weights do not change. From far away they
+  /// would not let go of the prior: what is left there is all correlated.
+  bool near = false;
+  bool intervals = true;  ///< false: without covariance and singular values
   /// A round that lowers the cost by less, in squared standard errors, is the last.
   double least_gain = 1e-4;
   std::function<void(const std::string&)> progress;  ///< may be empty

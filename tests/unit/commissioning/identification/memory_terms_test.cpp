@@ -197,6 +197,64 @@ TEST(TermSelection, KeepsWhatIsThereAndLeavesOutWhatIsNot) {
   }
 }
 
+/// Chambers pressed in turn by one sine of 0.2 Hz, behind a delay and nothing else.
+struct Delayed {
+  Delayed() {
+    experiment.arm.segments[0].damping_nms_per_rad = 0.01;
+    plain.stiffness = plain.damping = plain.inertia = plain.lag = plain.delay = false;
+    plain.gains = GainSharing::arm;
+    ArmHypothesis truth = configured(experiment);
+    truth.inertia = false;
+    truth.dead_time_s = 0.25;
+    record = pressed(40.0, [](double t) { return 0.3 * std::sin(0.4 * M_PI * t); });
+    EXPECT_TRUE(ResponseModel(record).simulate(truth, 0.05, record.u_rad));
+    test::add_noise(record, 0.02, 0.0, 3);
+    options.identify.window_s = 0.5;
+    options.identify.refinement.weighted = false;
+    options.identify.refinement.prior = 1.0;
+  }
+  SelectedModel select(int threads) {
+    options.identify.refinement.threads = threads;
+    return select_terms(configured(experiment), ActuationKind::chambers, plain,
+                        std::span(&record, 1), halves(record), options);
+  }
+
+  Experiment experiment = weightless();
+  FitChoice plain;
+  MotionRecord record;
+  SelectionOptions options;
+};
+
+/// Behind one sine a lag is nearly what a delay is. It is tried first; then neither the delay beside
+/// it gains nor can it go, and the model with the delay alone is two steps away.
+TEST(TermSelection, ExchangesATermWhereNoSingleStepHelps) {
+  const SelectedModel found = Delayed().select(1);
+  const auto kept = [&](const std::string& name) {
+    int out = -1;  // never tried
+    for (const TermTrial& trial : found.trials)
+      if (trial.name == name) out = std::max(out, trial.kept ? 1 : 0);
+    return out;
+  };
+  EXPECT_EQ(kept("filling and venting"), 1);
+  EXPECT_EQ(kept("delay"), 0);
+  EXPECT_EQ(kept("without filling and venting"), 0);
+  EXPECT_EQ(kept("delay for filling and venting"), 1);
+  EXPECT_TRUE(found.choice.delay);
+  EXPECT_FALSE(found.choice.venting || found.choice.chamber_lags);
+  EXPECT_NEAR(found.arm.dead_time_s, 0.25, 0.02);
+}
+
+TEST(TermSelection, DoesNotDependOnThreads) {
+  const SelectedModel one = Delayed().select(1), five = Delayed().select(5);
+  ASSERT_EQ(one.trials.size(), five.trials.size());
+  for (std::size_t i = 0; i < one.trials.size(); ++i) {
+    EXPECT_EQ(one.trials[i].name, five.trials[i].name);
+    EXPECT_EQ(one.trials[i].kept, five.trials[i].kept);
+    EXPECT_EQ(one.trials[i].unseen_of, five.trials[i].unseen_of);
+  }
+  EXPECT_EQ(one.whole.x, five.whole.x);
+}
+
 /// An arm with three chambers a segment, what was identified of it, and the file that says so.
 struct FoundArm {
   explicit FoundArm(int segments)
