@@ -97,10 +97,12 @@ class Pages(unittest.TestCase):
         self.addCleanup(player.terminate)
         url = next(found[1] for line in player.stdout if (found := re.search(r"(http://\S+)", line)))
         text = "[...document.querySelectorAll('p')].map(p => p.textContent).find(t => t.includes('tip ['))"
+        label = "[...document.querySelectorAll('label')].find(l => l.textContent === 'pause')"  # viser has others
+        pause = f"document.getElementById({label}.htmlFor).click()"
         with browser.Page(url) as page:
             first = page.wait(text)
             page.wait(f"{text} !== {first!r}", "motion")
-            page.value("document.querySelector('input[type=checkbox]').click()")
+            page.value(pause)
 
             def still():
                 before = page.value(text)
@@ -108,7 +110,7 @@ class Pages(unittest.TestCase):
                 return page.value(text) == before
 
             wait_for(still, "a pause")
-            page.value("document.querySelector('input[type=checkbox]').click()")
+            page.value(pause)
             paused = page.value(text)
             page.wait(f"{text} !== {paused!r}", "motion again")
             self.assertEqual(page.errors, [])
