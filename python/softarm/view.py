@@ -108,18 +108,18 @@ def read_csv(path, experiment):
     if not rows:
         raise ValueError(f"{path}: expected rows of a run, found none")
 
-    def columns(prefix, unit):
-        names = [f"{prefix}{i + 1}_{axis}_{unit}" for i in range(experiment.segments) for axis in "xy"]
+    def columns(names):
         return np.array([[float(row.get(name) or "nan") for name in names] for row in rows])
 
-    chambers = [name for name in rows[0] if name.startswith("pm") and name.endswith("_bar")]
-    def lengths(prefix):
-        names = [f"{prefix}{i + 1}_m" for i in range(experiment.segments) if f"{prefix}{i + 1}_m" in rows[0]]
-        return np.array([[float(row[name] or "nan") for name in names] for row in rows])
+    def bends(prefix):
+        return columns([f"{prefix}{i + 1}_{axis}_rad" for i in range(experiment.segments) for axis in "xy"])
 
-    u, u_ref, u_true = columns("u", "rad"), columns("ref", "rad"), columns("true", "rad")
+    def lengths(prefix):  # not there where segments do not stretch
+        return columns([name for i in range(experiment.segments) if (name := f"{prefix}{i + 1}_m") in rows[0]])
+
+    u, u_ref, u_true = bends("u"), bends("ref"), bends("true")
     e, e_ref, e_true = lengths("e"), lengths("eref"), lengths("etrue")
-    pressures = np.array([[float(row[name] or "nan") for name in chambers] for row in rows])
+    pressures = columns([name for name in rows[0] if name.startswith("pm") and name.endswith("_bar")])
     return [
         Picture(float(row["t_s"]), row["mode"], row["reason"], u[k], u_ref[k], u_true[k], pressures[k], e[k], e_ref[k], e_true[k])
         for k, row in enumerate(rows)

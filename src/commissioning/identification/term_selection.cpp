@@ -132,10 +132,7 @@ class Selection {
     out.choice = best_.choice;
     out.prior = best_.prior;
     const ParameterSet set = unknowns(out.choice);
-    IdentifyOptions search = options_.identify;
-    search.refinement.prior = out.prior;
-    search.refinement.near = !out.choice.elongation;
-    out.whole = find(set, records_, search, best_.arms);
+    out.whole = find(set, records_, search_for(out.choice, out.prior), best_.arms);
     out.arm = set.arm(out.whole.x);
     out.by_fold = std::move(best_.arms);
     out.trials = std::move(trials_);
@@ -302,14 +299,20 @@ class Selection {
     for (const Attempt& each : tried)
       if (&each != found) trials_.push_back(each.trial);
     if (found == &best_) return false;
-    Attempt kept = std::move(*found);
-    keep(std::move(kept));
+    keep(std::move(*found));
     return true;
+  }
+
+  IdentifyOptions search_for(const FitChoice& choice, double prior) const {
+    IdentifyOptions out = options_.identify;
+    out.refinement.prior = prior;
+    out.refinement.near = !choice.elongation;
+    out.refinement.least_gain = std::max(kLeastGain, out.refinement.least_gain);
+    return out;
   }
 
   static Refinement find(const ParameterSet& set, std::span<const MotionRecord> records,
                          IdentifyOptions options, const std::vector<ArmHypothesis>& near) {
-    options.refinement.least_gain = std::max(kLeastGain, options.refinement.least_gain);
     options.near.insert(options.near.end(), near.begin(), near.end());
     return identify(set, records, options);
   }
@@ -333,11 +336,9 @@ class Selection {
     if (move.near != nullptr) out.arms = move.near->arms;
     std::vector<double> samples(folds_.size(), 0.0);
     const auto parts = static_cast<int>(folds_.size());
-    IdentifyOptions search = options_.identify;
-    search.refinement.prior = move.prior;
+    IdentifyOptions search = search_for(move.choice, move.prior);
     search.refinement.threads = std::max(1, threads / parts);
     search.refinement.intervals = false;
-    search.refinement.near = !move.choice.elongation;
     search.refinement.progress = [this](const std::string& text) {
       const std::lock_guard lock(reporting_);
       if (options_.identify.refinement.progress) options_.identify.refinement.progress(text);
