@@ -282,6 +282,8 @@ static void describe_memory(Keys& key, IdentificationSettings& it, std::size_t c
   KEY(saturation_1pbar, from(-100, 100).one_or_each(),
       "of every chamber, q: p counts as p (1 + q p)");
   KEY(stiffening_1pbar, from(-100, 100), "s: k counts as k (1 + s sum of the segment's pressures)");
+  KEY(stiffening_by_length, from(-20, 20),
+      "q: k counts as k (l / L)^q, with the l that pressures give by stretch_m_per_bar");
   it.cross_nm_per_bar.resize(2 * n * chambers, 0.0);
   KEY(cross_nm_per_bar, from(-1e4, 1e4).one_or_each(),
       "of every chamber in turn, 2n numbers: force on all segments beside push_nm_per_bar");

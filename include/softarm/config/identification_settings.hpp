@@ -22,7 +22,7 @@ struct IdentificationSettings {
   std::vector<double> push_nm_per_bar;  ///< pairs, generalized force in u; all 0: as `actuation`
   std::vector<double> fill_lag_s, vent_lag_s;  ///< all 0: lag_s
   std::vector<double> saturation_1pbar;
-  double stiffening_1pbar = 0.0;
+  double stiffening_1pbar = 0.0, stiffening_by_length = 0.0;
   std::vector<double> cross_nm_per_bar;  ///< chambers x 2n
   std::vector<double> slip_radius_rad = {0.0}, slip_stiffness_nm_per_rad = {0.0};
   double remanence = 0.0, remanence_s = 30.0;

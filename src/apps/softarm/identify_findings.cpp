@@ -88,28 +88,28 @@ int choose_terms(const Experiment& experiment, IdentifyCommand& command,
   SelectionOptions options;
   options.identify = command.options;
   const ArmHypothesis start = configured(experiment);
-  std::optional<SelectedModel> bend, stretch;
+  const ActuationKind kind = experiment.actuation.kind;
+  SelectedModel bend;
+  std::optional<SelectedModel> lengths;
   {
     Progress progress;
     options.progress = [&](const std::string& text) { progress.update(text); };
-    bend = select_terms(start, experiment.actuation.kind, command.choice, records, folds, options);
     if (command.stretch) {
-      FitChoice lengths;
-      lengths.elongation = true;
-      options.identify.refinement.prior = std::max(1.0, options.identify.refinement.prior);
-      bend_as_predicted(*bend, folds);
-      stretch = select_terms(start, experiment.actuation.kind, lengths, records, folds, options);
-      bend->arm.elongation = stretch->arm.elongation;
+      SelectedArm found = select_arm(start, kind, command.choice, records, folds, options);
+      bend = std::move(found.bend);
+      lengths = std::move(found.lengths);
+    } else {
+      bend = select_terms(start, kind, command.choice, records, folds, options);
     }
   }
-  command.choice = bend->choice;
-  fmt::print("{}", selection_text(*bend, bend->whole.motion_rms_rad, 1e3, "mrad"));
-  if (stretch)
-    fmt::print("\nlengths\n{}", selection_text(*stretch, stretch->whole.motion_rms_rad, 1e3, "mm"));
-  const ParameterSet set(bend->arm, experiment.actuation.kind, bend->choice);
-  fmt::print("\nas chosen, on all that was given:\n{}", fit_table(set, bend->whole));
-  print_held_out(bend->arm, experiment, held_out, command);
-  write_findings(experiment, command, bend->arm, bend->whole, findings);
+  command.choice = bend.choice;
+  fmt::print("{}", selection_text(bend, bend.whole.motion_rms_rad, 1e3, "mrad"));
+  if (lengths)
+    fmt::print("\nlengths\n{}", selection_text(*lengths, lengths->whole.motion_rms_rad, 1e3, "mm"));
+  const ParameterSet set(bend.arm, kind, bend.choice);
+  fmt::print("\nas chosen, on all that was given:\n{}", fit_table(set, bend.whole));
+  print_held_out(bend.arm, experiment, held_out, command);
+  write_findings(experiment, command, bend.arm, bend.whole, findings);
   return kExitOk;
 }
 

@@ -80,6 +80,8 @@ void add_choice_options(CLI::App& command, IdentifyCommand& options) {
   command.add_flag("--second-remanence", options.choice.second_remanence,
                    "fit another one that follows faster");
   command.add_flag("--stiffening", options.choice.stiffening, "fit a stiffness that pressures add");
+  command.add_flag("--stiffening-by-length", options.choice.by_length,
+                   "fit a stiffness that follows the length by identification.stretch_m_per_bar");
   command.add_flag("--cross", options.choice.cross, "fit forces of chambers on other segments");
   command.add_flag("--mass", options.choice.mass, "fit one factor on all masses");
   command.add_flag("--load", options.choice.load, "fit a point mass at the tip");

@@ -166,6 +166,7 @@ std::string memory_yaml(const ArmHypothesis& arm, bool directions) {
   text += row("vent_lag_s", times(arm.lags, &FillVentLag::vent_s));
   text += row("saturation_1pbar", arm.saturation_1pbar);
   text += row("stiffening_1pbar", arm.stiffening_1pbar);
+  text += row("stiffening_by_length", arm.stiffening_by_length);
   text += row("cross_nm_per_bar", arm.cross_nm_per_bar.reshaped());
   text += slip_yaml(arm.slip_springs);
   if (arm.remanence.share != 0.0) {

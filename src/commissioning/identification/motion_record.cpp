@@ -15,6 +15,9 @@ MotionRecord MotionRecord::part(double from_s, double to_s, double lead_s) const
   out.time_s = time_s.segment(first, std::max<Eigen::Index>(0, last - first));
   out.u_rad = u_rad.middleRows(first, out.time_s.size());
   if (chord_m.rows() > 0) out.chord_m = chord_m.middleRows(first, out.time_s.size());
+  out.lengths = lengths;
+  if (lengths.pressed_m.rows() > 0)
+    out.lengths.pressed_m = lengths.pressed_m.middleRows(first, out.time_s.size());
   out.input = input;
   out.noise_rad = noise_rad;
   out.scored_from_s = std::max(scored_from_s, from_s);
@@ -47,6 +50,8 @@ MotionRecord MotionRecord::thinned(double apart_s) const {
   out.time_s = time_s(kept).eval();
   out.u_rad = u_rad(kept, Eigen::all).eval();
   if (chord_m.rows() > 0) out.chord_m = chord_m(kept, Eigen::all).eval();
+  if (lengths.pressed_m.rows() > 0)
+    out.lengths.pressed_m = lengths.pressed_m(kept, Eigen::all).eval();
   return out;
 }
 

@@ -16,9 +16,12 @@ constexpr double kHardens_rad = 0.2;  ///< a cubic stiffness of its scale double
 constexpr double kLagScale_s = 0.1, kDelayScale_s = 0.05, kRestScale_rad = 0.1;
 constexpr double kFill_s = 0.1, kVent_s = 0.3;  ///< where no lag is configured, the prior's
 constexpr double kLongest_s = 10.0;             ///< lag of a chamber
+/// Chambers of one arm are built alike: how far one may differ, in parts of what all have.
+constexpr double kAlike = 0.5;
 constexpr double kSaturation_1pbar = 0.5, kMostSaturation_1pbar = 2.0, kStiffening_1pbar = 0.5;
-constexpr double kSlipShare = 0.1, kSlipScale = 0.3;    ///< of k, a slip spring
-constexpr double kRemanent = 0.2, kRemanence_s = 20.0;  ///< share and time
+constexpr double kByLength = 2.0, kMostByLength = 20.0;  ///< exponents
+constexpr double kSlipShare = 0.1, kSlipScale = 0.3;     ///< of k, a slip spring
+constexpr double kRemanent = 0.2, kRemanence_s = 20.0;   ///< share and time
 constexpr double kSecondRemanence_s = 5.0, kSoonest_s = 0.3, kLatest_s = 30.0;
 constexpr double kRemanentScale_rad = 0.05, kCross = 0.15;
 constexpr double kStretch_mpbar = 0.02, kOffsetScale_m = 0.02, kFrictionScale_m = 2e-3;
@@ -61,7 +64,16 @@ ParameterSet::ParameterSet(const ArmHypothesis& start, ActuationKind kind, const
   }
   for (Parameter& each : parameters_) each.linear = true;
   add_times(choice);
-  add_lags(choice);
+  if (choice.venting || choice.chamber_lags) {
+    start_.lags = start_.input_lags();
+    add_lags(
+        "filling", "venting", choice.chamber_lags,
+        [](const ArmHypothesis& arm) { return arm.input_lags(); },
+        [](ArmHypothesis & arm) -> auto& {
+          if (arm.lags.empty()) arm.lags = arm.input_lags();
+          return arm.lags;
+        });
+  }
   add_memory(choice);
   add_masses(choice);
 }
@@ -175,33 +187,69 @@ void ParameterSet::add_times(const FitChoice& choice) {
     parameters_.back().difference = kJagged_s / parameters_.back().scale;
 }
 
-void ParameterSet::add_lags(const FitChoice& choice) {
-  if (!choice.venting && !choice.chamber_lags) return;
-  start_.lags = start_.input_lags();
-  const std::size_t chambers = start_.lags.size();
-  const std::size_t count = choice.chamber_lags ? chambers : 1;
-  for (const bool vent : {false, true})
-    for (std::size_t j = 0; j < count; ++j) {
-      const auto member = vent ? &FillVentLag::vent_s : &FillVentLag::fill_s;
-      const double expected_s = vent ? kVent_s : kFill_s;
-      Parameter it{fmt::format("{}{}", vent ? "venting" : "filling",
-                               count > 1 ? fmt::format(", chamber {}", j + 1) : ""),
-                   "s",
-                   2.0 * expected_s,
-                   [=](const ArmHypothesis& arm) {
-                     return arm.lags.empty() ? arm.lag_s : arm.lags[j].*member;
-                   },
-                   [=](ArmHypothesis& arm, double value) {
-                     if (arm.lags.size() != chambers) arm.lags = arm.input_lags();
-                     for (std::size_t k = 0; k < chambers; ++k)
-                       if (count == 1 || k == j) arm.lags[k].*member = value;
-                   },
-                   0.0};
-      it.difference = kCoarse;
+/// Of all chambers alike, and, with `each`, by how much every one differs.
+/// @param read, write  the lags of an arm, one per chamber: a copy, and a reference
+template <class Read, class Write>
+void ParameterSet::add_lags(const char* filling, const char* venting, bool each, Read read,
+                            Write write) {
+  const std::vector<FillVentLag> configured = read(start_);
+  for (const bool vent : {false, true}) {
+    const auto time = vent ? &FillVentLag::vent_s : &FillVentLag::fill_s;
+    const auto mean = [=](const std::vector<FillVentLag>& lags) {
+      double sum = 0.0;
+      for (const FillVentLag& lag : lags) sum += lag.*time;
+      return sum / static_cast<double>(lags.size());
+    };
+    const double expected_s = vent ? kVent_s : kFill_s, scale_s = 2.0 * expected_s;
+    const auto add = [&](std::string name, double scale, auto get, auto set, double lowest) {
+      Parameter it{std::move(name), "s", scale, get, set, lowest};
       it.highest = kLongest_s;
-      if (!(start_.lags[j].*member > 0.0)) it.expected = expected_s;
+      it.difference = kCoarse;
       parameters_.push_back(std::move(it));
-    }
+    };
+    const char* const name = vent ? venting : filling;
+    add(
+        name, scale_s, [=](const ArmHypothesis& arm) { return mean(read(arm)); },
+        [=](ArmHypothesis& arm, double value) {
+          for (FillVentLag& lag : write(arm)) lag.*time = value;
+        },
+        0.0);
+    if (!(mean(configured) > 0.0)) parameters_.back().expected = expected_s;
+    for (std::size_t j = 0; each && j < configured.size(); ++j)
+      add(
+          fmt::format("{}, chamber {} beyond that", name, j + 1), kAlike * scale_s,
+          [=](const ArmHypothesis& arm) {
+            const std::vector<FillVentLag> lags = read(arm);
+            return lags[j].*time - mean(lags);
+          },
+          [=](ArmHypothesis& arm, double value) {
+            double& lag_s = write(arm)[j].*time;
+            lag_s = std::max(0.0, lag_s + value);  // no lag is less than none
+          },
+          kUnbounded);
+  }
+}
+
+/// Of all chambers alike, and, with `each`, by how much every one differs.
+template <class Of>
+void ParameterSet::add_saturation(const char* name, bool each, Of of) {
+  const auto mean = [of](const ArmHypothesis& arm) {
+    return of(arm).size() > 0 ? of(arm).mean() : 0.0;
+  };
+  const auto add = [&](std::string what, double scale, auto get, auto set) {
+    Parameter it{std::move(what), "1/bar", scale, get, set, -kMostSaturation_1pbar};
+    it.highest = kMostSaturation_1pbar;
+    it.difference = kCoarse;
+    parameters_.push_back(std::move(it));
+  };
+  const Eigen::Index inputs = start_.input_map.cols();
+  add(name, kSaturation_1pbar, mean,
+      [=](ArmHypothesis& arm, double value) { of(arm).setConstant(inputs, value); });
+  for (Eigen::Index j = 0; each && j < inputs; ++j)
+    add(
+        fmt::format("{}, chamber {} beyond that", name, j + 1), kAlike * kSaturation_1pbar,
+        [=](const ArmHypothesis& arm) { return of(arm).size() > j ? of(arm)[j] - mean(arm) : 0.0; },
+        [=](ArmHypothesis& arm, double value) { of(arm)[j] += value; });
 }
 
 void ParameterSet::add_memory(const FitChoice& choice) {
@@ -218,22 +266,8 @@ void ParameterSet::add_memory(const FitChoice& choice) {
   const double none = std::numeric_limits<double>::quiet_NaN(), inf = -kUnbounded;
   if (choice.saturation || choice.one_saturation) {
     if (start_.saturation_1pbar.size() != inputs) start_.saturation_1pbar.setZero(inputs);
-    for (Eigen::Index j = 0; j < (choice.saturation ? inputs : 1); ++j)
-      number(
-          choice.saturation ? fmt::format("saturation, chamber {}", j + 1) : "saturation", "1/bar",
-          kSaturation_1pbar,
-          [=](const ArmHypothesis& arm) {
-            return arm.saturation_1pbar.size() > j ? arm.saturation_1pbar[j] : 0.0;
-          },
-          [=, each = choice.saturation](ArmHypothesis& arm, double value) {
-            if (arm.saturation_1pbar.size() != inputs) arm.saturation_1pbar.setZero(inputs);
-            if (each) {
-              arm.saturation_1pbar[j] = value;
-            } else {
-              arm.saturation_1pbar.setConstant(value);
-            }
-          },
-          -kMostSaturation_1pbar, kMostSaturation_1pbar, none);
+    add_saturation(
+        "saturation", choice.saturation, [](auto& arm) -> auto& { return arm.saturation_1pbar; });
   }
   if (choice.hysteresis)
     for (std::size_t i = 0; i < start_.slip_springs.size(); ++i)
@@ -254,6 +288,12 @@ void ParameterSet::add_memory(const FitChoice& choice) {
         [](const ArmHypothesis& arm) { return arm.stiffening_1pbar; },
         [](ArmHypothesis& arm, double value) { arm.stiffening_1pbar = value; }, kUnbounded, inf,
         none);
+  if (choice.by_length)
+    number(
+        "stiffening by length", "1", kByLength,
+        [](const ArmHypothesis& arm) { return arm.stiffening_by_length; },
+        [](ArmHypothesis& arm, double value) { arm.stiffening_by_length = value; }, -kMostByLength,
+        kMostByLength, none);
   if (choice.remanence) {
     if (start_.remanent_rad.size() != start_.arm.dof())
       start_.remanent_rad.setZero(start_.arm.dof());
@@ -375,41 +415,14 @@ void ParameterSet::add_elongation(const FitChoice& choice) {
           kStretch_mpbar, [=](auto& e) -> auto& { return e.gain_m_per_bar(i, j); }, kUnbounded, inf,
           none);
     }
-  const std::size_t count = choice.chamber_lags ? it.lags.size() : 1;
-  for (const bool vent : {false, true})
-    for (std::size_t j = 0; j < count; ++j) {
-      const auto time = vent ? &FillVentLag::vent_s : &FillVentLag::fill_s;
-      const double expected_s = vent ? kVent_s : kFill_s;
-      Parameter one{fmt::format("{}{}", vent ? "shortening" : "lengthening",
-                                count > 1 ? fmt::format(", chamber {}", j + 1) : ""),
-                    "s",
-                    2.0 * expected_s,
-                    [=](const ArmHypothesis& arm) { return arm.elongation.lags[j].*time; },
-                    [=](ArmHypothesis& arm, double value) {
-                      for (std::size_t k = 0; k < arm.elongation.lags.size(); ++k)
-                        if (count == 1 || k == j) arm.elongation.lags[k].*time = value;
-                    },
-                    0.0};
-      one.highest = kLongest_s;
-      one.difference = kCoarse;
-      if (!(it.lags[j].*time > 0.0)) one.expected = expected_s;
-      parameters_.push_back(std::move(one));
-    }
-  if (choice.saturation) {
-    for (Eigen::Index j = 0; j < inputs; ++j)
-      number(
-          fmt::format("saturation of stretch, chamber {}", j + 1), "1/bar",
-          kSaturation_1pbar, [=](auto& e) -> auto& { return e.saturation_1pbar[j]; },
-          -kMostSaturation_1pbar, kMostSaturation_1pbar, none);
-  } else if (choice.one_saturation) {
-    number(
-        "saturation of stretch", "1/bar", kSaturation_1pbar,
-        [](auto& e) -> auto& { return e.saturation_1pbar[0]; }, -kMostSaturation_1pbar,
-        kMostSaturation_1pbar, none);
-    parameters_.back().set = [](ArmHypothesis& arm, double value) {
-      arm.elongation.saturation_1pbar.setConstant(value);
-    };
-  }
+  add_lags(
+      "lengthening", "shortening", choice.chamber_lags,
+      [](const ArmHypothesis& arm) { return arm.elongation.lags; },
+      [](ArmHypothesis & arm) -> auto& { return arm.elongation.lags; });
+  if (choice.saturation || choice.one_saturation)
+    add_saturation(
+        "saturation of stretch", choice.saturation,
+        [](auto& arm) -> auto& { return arm.elongation.saturation_1pbar; });
   if (choice.hysteresis)
     number(
         "friction of stretch", "m", kFrictionScale_m, [](auto& e) -> auto& { return e.friction_m; },

@@ -12,6 +12,7 @@ constexpr double kLargest_rad = 20.0;  ///< a response beyond it is not that of 
 constexpr double kBalanced_rad = 1e-10;
 constexpr double kSlow = 0.2;  ///< a round that shortens the step less needs the slope of its place
 constexpr int kMostNewtonRounds = 30;
+constexpr double kShortest = 0.1;  ///< of the configured length: shorter is no segment
 
 // Alexander's method of order 3: gamma is the root of x^3 - 3 x^2 + 3 x / 2 - 1/6 in (1/6, 1/2).
 constexpr double kGamma = 0.435866521508459;
@@ -43,8 +44,30 @@ void RemanentRest::step(const ArmHypothesis& arm, const Eigen::VectorXd& u, doub
   rest = arm.rest_rad + slow_ + second_;
 }
 
+void StretchedStiffness::at(Eigen::Index k, const KnownLengths& lengths) {
+  if (lengths.pressed_m.rows() == 0) return;
+  pressed_m_ =
+      0.5 * (lengths.pressed_m.row(std::max<Eigen::Index>(0, k - 1)) + lengths.pressed_m.row(k));
+  by_bend_m_per_rad2_ = lengths.by_bend_m_per_rad2;
+}
+
+double StretchedStiffness::length_ratio(Eigen::Index i, const Eigen::Vector2d& u) const {
+  const double ratio = (pressed_m_[i] + by_bend_m_per_rad2_ * u.squaredNorm()) /
+                       arm_.arm.segments[static_cast<std::size_t>(i)].length_m;
+  return std::max(kShortest, ratio);
+}
+
+double StretchedStiffness::factor(Eigen::Index i, const Eigen::Vector2d& u) const {
+  return given() ? std::pow(length_ratio(i, u), arm_.stiffening_by_length) : 1.0;
+}
+
+Eigen::Vector2d StretchedStiffness::gradient(Eigen::Index i, const Eigen::Vector2d& u) const {
+  return 2.0 * by_bend_m_per_rad2_ * arm_.stiffening_by_length * factor(i, u) /
+         (length_ratio(i, u) * arm_.arm.segments[static_cast<std::size_t>(i)].length_m) * u;
+}
+
 QuasiStaticMotion::QuasiStaticMotion(const ArmHypothesis& arm)
-    : arm_(arm), plain_(arm.arm), workspace_(arm.arm) {
+    : arm_(arm), plain_(arm.arm), workspace_(arm.arm), stretched_(arm) {
   const Eigen::Index dof = arm.arm.dof();
   damping_.resize(dof);
   for (Eigen::Index c = 0; c < dof; ++c)
@@ -89,7 +112,9 @@ void QuasiStaticMotion::balance(const Eigen::VectorXd& u, Eigen::VectorXd& out) 
   out -= force_;
   for (Eigen::Index i = 0; i < u.size(); i += 2) {
     const Eigen::Vector2d bend = u.segment<2>(i) - rest_.segment<2>(i);
-    out.segment<2>(i) += (stiffness_[i] + arm_.cubic_nm_per_rad3 * bend.squaredNorm()) * bend;
+    out.segment<2>(i) += (stiffness_[i] * stretched_.factor(i / 2, u.segment<2>(i)) +
+                          arm_.cubic_nm_per_rad3 * bend.squaredNorm()) *
+                         bend;
     for (std::size_t k = 0; k < centres_.size(); ++k)
       out.segment<2>(i) += arm_.slip_springs[k].moment(centres_[k].segment<2>(i), u.segment<2>(i));
   }
@@ -100,8 +125,11 @@ void QuasiStaticMotion::slope(const Eigen::VectorXd& u) {
   slope_ = gravity_slope_;
   for (Eigen::Index i = 0; i < u.size(); i += 2) {
     const Eigen::Vector2d bend = u.segment<2>(i) - rest_.segment<2>(i);
-    Eigen::Matrix2d own =
-        (stiffness_[i] + arm_.cubic_nm_per_rad3 * bend.squaredNorm()) * Eigen::Matrix2d::Identity();
+    Eigen::Matrix2d own = (stiffness_[i] * stretched_.factor(i / 2, u.segment<2>(i)) +
+                           arm_.cubic_nm_per_rad3 * bend.squaredNorm()) *
+                          Eigen::Matrix2d::Identity();
+    if (stretched_.given())
+      own += stiffness_[i] * bend * stretched_.gradient(i / 2, u.segment<2>(i)).transpose();
     own += 2.0 * arm_.cubic_nm_per_rad3 * bend * bend.transpose();
     for (std::size_t k = 0; k < centres_.size(); ++k)
       own += arm_.slip_springs[k].slope(centres_[k].segment<2>(i), u.segment<2>(i));

@@ -24,6 +24,29 @@ class RemanentRest {
   Eigen::VectorXd slow_, second_;  // 2n
 };
 
+/// Stiffness that follows the length of a segment: k (l / L)^q with l = pressed + c |u|^2.
+class StretchedStiffness {
+ public:
+  /// @param arm  must outlive this
+  explicit StretchedStiffness(const ArmHypothesis& arm) : arm_(arm) {}
+
+  /// The lengths from frame k - 1 to frame k, k = 0 at the first; without any it is k alone.
+  void at(Eigen::Index k, const KnownLengths& lengths);
+  bool given() const { return pressed_m_.size() > 0; }
+
+  /// (l / L)^q of segment i with the bend u.
+  double factor(Eigen::Index i, const Eigen::Vector2d& u) const;
+  /// Its gradient in u.
+  Eigen::Vector2d gradient(Eigen::Index i, const Eigen::Vector2d& u) const;
+
+ private:
+  double length_ratio(Eigen::Index i, const Eigen::Vector2d& u) const;
+
+  const ArmHypothesis& arm_;
+  Eigen::VectorXd pressed_m_;
+  double by_bend_m_per_rad2_ = 0.0;
+};
+
 /// D u' = input - springs - slip springs - G(u), by the third-order stiffly accurate SDIRK method
 /// (Alexander 1977, L-stable): stable for any step and any damping, D = 0 included, where every step
 /// ends in balance. What remembers is advanced at the end of a step.
@@ -42,6 +65,8 @@ class QuasiStaticMotion {
   /// One step; inputs at the stages. False where it has no bounded solution.
   [[nodiscard]] bool step(double step_s, const Eigen::VectorXd (&inputs)[kStages]);
 
+  StretchedStiffness& stretched() { return stretched_; }
+
   const Eigen::VectorXd& u_rad() const { return u_; }
 
  private:
@@ -56,7 +81,8 @@ class QuasiStaticMotion {
   DynamicsWorkspace workspace_;
   bool heavy_ = false;
   Eigen::MatrixXd gravity_slope_;
-  Eigen::VectorXd damping_, stiffness_;   ///< of every coordinate; stiffness as pressures make it
+  Eigen::VectorXd damping_, stiffness_;  ///< of every coordinate; stiffness as it counts now
+  StretchedStiffness stretched_;
   Eigen::VectorXd input_, force_, rest_;  ///< of the stage; rest with what is remanent
   RemanentRest remanents_;
   std::vector<Eigen::VectorXd> centres_;  ///< 2n, of every slip spring

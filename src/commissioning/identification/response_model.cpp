@@ -46,6 +46,7 @@ class Motion {
       : arm_(arm),
         plain_(arm.arm),
         workspace_(arm.arm),
+        stretched_(arm),
         force_(arm.arm.dof()),
         spring_(arm.arm.dof()) {
     // The springs are added here, with their rest and their cubic part.
@@ -78,6 +79,8 @@ class Motion {
         arm_.rest_rad);
   }
 
+  StretchedStiffness& stretched() { return stretched_; }
+
   /// What remembers starts here: friction without tension.
   void remember_from(const Eigen::VectorXd& u) { centres_.assign(arm_.slip_springs.size(), u); }
 
@@ -106,14 +109,16 @@ class Motion {
 
  private:
   void springs(const Eigen::VectorXd& u, const Eigen::VectorXd& input) {
-    if (!arm_.remembers() && arm_.stiffening_1pbar == 0.0) return spring_force(arm_, u, spring_);
+    if (!arm_.remembers() && arm_.stiffening_1pbar == 0.0 && !stretched_.given())
+      return spring_force(arm_, u, spring_);
     for (Eigen::Index i = 0; i < u.size(); i += 2) {
       const Eigen::Vector2d bend = u.segment<2>(i) - rest_.segment<2>(i);
       double sum_bar = 0.0;
       for (std::size_t j = 0; j < arm_.segment_of.size(); ++j)
         if (arm_.segment_of[j] == i / 2) sum_bar += input[static_cast<Eigen::Index>(j)];
       const double k = arm_.arm.segments[static_cast<std::size_t>(i / 2)].stiffness_nm_per_rad *
-                       (1.0 + arm_.stiffening_1pbar * sum_bar);
+                       (1.0 + arm_.stiffening_1pbar * sum_bar) *
+                       stretched_.factor(i / 2, u.segment<2>(i));
       spring_.segment<2>(i) = (k + arm_.cubic_nm_per_rad3 * bend.squaredNorm()) * bend;
       for (std::size_t k2 = 0; k2 < centres_.size(); ++k2)
         spring_.segment<2>(i) +=
@@ -154,6 +159,7 @@ class Motion {
   const ArmHypothesis& arm_;
   ArmParameters plain_;
   DynamicsWorkspace workspace_;
+  StretchedStiffness stretched_;
   Eigen::VectorXd force_, spring_, rest_;
   RemanentRest remanents_;
   std::vector<Eigen::VectorXd> centres_;  ///< of the slip springs
@@ -185,6 +191,7 @@ void with_memory(const IdentificationSettings& extra, ArmHypothesis& out) {
     out.lags = lags(extra.fill_lag_s, extra.vent_lag_s);
   if (any(extra.saturation_1pbar)) out.saturation_1pbar = vector(extra.saturation_1pbar);
   out.stiffening_1pbar = extra.stiffening_1pbar;
+  out.stiffening_by_length = extra.stiffening_by_length;
   if (any(extra.cross_nm_per_bar))
     out.cross_nm_per_bar = columns(extra.cross_nm_per_bar, out.arm.dof());
   for (std::size_t k = 0; k < extra.slip_radius_rad.size(); ++k)
@@ -317,6 +324,12 @@ bool ResponseModel::simulate(const ArmHypothesis& arm, double longest_step_s,
                      : simulate_balance(arm, longest_step_s, u);
 }
 
+KnownLengths ResponseModel::stretching(const ArmHypothesis& arm) const {
+  if (arm.stiffening_by_length == 0.0) return {};
+  return record_.lengths.pressed_m.rows() > 0 || !arm.elongation.given() ? record_.lengths
+                                                                         : lengths_of(arm);
+}
+
 bool ResponseModel::simulate_motion(const ArmHypothesis& arm, double longest_step_s,
                                     Eigen::MatrixXd& u) const {
   const Eigen::Index frames = record_.time_s.size(), dof = arm.arm.dof();
@@ -325,6 +338,8 @@ bool ResponseModel::simulate_motion(const ArmHypothesis& arm, double longest_ste
   motion.reserve(dof);
   Eigen::VectorXd p0(arm.input_map.cols()), p1 = p0, p2 = p0, v = Eigen::VectorXd::Zero(dof);
   input.at(record_.time_s[0], p0);
+  const KnownLengths lengths = stretching(arm);
+  motion.stretched().at(0, lengths);
   const std::optional<Eigen::VectorXd> settled = motion.settled(p0);
   if (!settled) return false;
   Eigen::VectorXd now = *settled;
@@ -334,6 +349,7 @@ bool ResponseModel::simulate_motion(const ArmHypothesis& arm, double longest_ste
     const double from_s = record_.time_s[k - 1], span_s = record_.time_s[k] - from_s;
     const int steps = std::max(1, static_cast<int>(std::ceil(span_s / longest_step_s - 1e-9)));
     const double h = span_s / steps;
+    motion.stretched().at(k, lengths);
     for (int j = 0; j < steps; ++j) {
       input.at(from_s + (j + 0.5) * h, p1);
       const double to_s = j + 1 == steps ? record_.time_s[k] : from_s + (j + 1) * h;
@@ -354,12 +370,15 @@ bool ResponseModel::simulate_balance(const ArmHypothesis& arm, double longest_st
   Eigen::VectorXd inputs[kStages];
   for (Eigen::VectorXd& each : inputs) each.setZero(arm.input_map.cols());
   input.at(record_.time_s[0], inputs[0]);
+  const KnownLengths lengths = stretching(arm);
+  motion.stretched().at(0, lengths);
   if (!motion.settle(inputs[0])) return false;
   u.row(0) = motion.u_rad();
   for (Eigen::Index k = 1; k < record_.time_s.size(); ++k) {
     const double from_s = record_.time_s[k - 1], span_s = record_.time_s[k] - from_s;
     const int steps = std::max(1, static_cast<int>(std::ceil(span_s / longest_step_s - 1e-9)));
     const double h = span_s / steps;
+    motion.stretched().at(k, lengths);
     for (int j = 0; j < steps; ++j) {
       for (int i = 0; i < kStages; ++i)
         input.at(from_s + (j + QuasiStaticMotion::kNodes[i]) * h, inputs[i], i + 1 == kStages);
@@ -370,11 +389,10 @@ bool ResponseModel::simulate_balance(const ArmHypothesis& arm, double longest_st
   return true;
 }
 
-void ResponseModel::simulate_lengths(const ArmHypothesis& arm, const Eigen::MatrixXd& u_rad,
-                                     Eigen::MatrixXd& length_m) const {
+KnownLengths ResponseModel::lengths_of(const ArmHypothesis& arm) const {
   const ElongationHypothesis& it = arm.elongation;
   const Eigen::Index frames = record_.time_s.size(), n = it.offset_m.size();
-  length_m.resize(frames, n);
+  KnownLengths out{Eigen::MatrixXd(frames, n), it.by_bend_m_per_rad2};
   LaggedInput input(record_.input, it.lags, arm.dead_time_s);
   Eigen::VectorXd p(it.gain_m_per_bar.cols()), centre, most;
   Eigen::VectorXd remanent = Eigen::VectorXd::Zero(n), remanent_2 = remanent;
@@ -394,11 +412,18 @@ void ResponseModel::simulate_lengths(const ArmHypothesis& arm, const Eigen::Matr
       if (it.remanence_2.share != 0.0)
         remanent_2[i] = it.remanence_2.step(remanent_2[i], centre[i], passed_s);
     }
-    length_m.row(k) = it.offset_m + centre + remanent + remanent_2 + it.set * most;
-    if (it.by_bend_m_per_rad2 == 0.0) continue;
-    for (Eigen::Index i = 0; i < n; ++i)
-      length_m(k, i) += it.by_bend_m_per_rad2 * u_rad.row(k).segment<2>(2 * i).squaredNorm();
+    out.pressed_m.row(k) = it.offset_m + centre + remanent + remanent_2 + it.set * most;
   }
+  return out;
+}
+
+void ResponseModel::simulate_lengths(const ArmHypothesis& arm, const Eigen::MatrixXd& u_rad,
+                                     Eigen::MatrixXd& length_m) const {
+  const KnownLengths lengths = lengths_of(arm);
+  length_m = lengths.pressed_m;
+  for (Eigen::Index i = 0; i < length_m.cols(); ++i)
+    length_m.col(i) +=
+        lengths.by_bend_m_per_rad2 * u_rad.middleCols<2>(2 * i).rowwise().squaredNorm();
 }
 
 }  // namespace softarm

@@ -24,6 +24,7 @@ struct Term {
 };
 
 constexpr Term kOfBend[] = {
+    {"stiffening by length", &FitChoice::by_length},
     {"filling and venting", &FitChoice::venting},
     {"rest", &FitChoice::rest},
     {"cross-coupling", &FitChoice::cross},
@@ -94,6 +95,7 @@ class Selection {
       : start_(start), kind_(kind), records_(records), folds_(folds), options_(options) {
     double rms = 0.0;
     for (const MotionRecord& record : records) {
+      knows_lengths_ = knows_lengths_ && record.lengths.pressed_m.rows() > 0;
       rms = std::max(rms, motion_rms(record.u_rad));
       for (Eigen::Index i = 0; i < record.u_rad.cols(); i += 2)
         reach_rad_ =
@@ -145,6 +147,7 @@ class Selection {
     if (term.flag == &FitChoice::venting) return !choice.chamber_lags;
     if (term.flag == &FitChoice::one_saturation) return !choice.saturation;
     if (term.flag == &FitChoice::second_remanence) return choice.remanence;
+    if (term.flag == &FitChoice::by_length) return knows_lengths_;
     return term.flag != &FitChoice::cross || start_.arm.size() > 1;
   }
 
@@ -263,6 +266,9 @@ class Selection {
           forecast.emplace_back(price(guess), Move{name, choice, best_.prior, &best_, added});
       };
       const FitChoice both = with(best_.choice, in, true);
+      for (const Term* also = &in + 1; also != std::end(kOfBend); ++also)
+        if (applies(*also, both))
+          consider(fmt::format("{} and {}", in.name, also->name), with(both, *also, true));
       for (const Term& out : kOfBend) {
         if (&in == &out || !may_go(out, both)) continue;
         const FitChoice one = with(both, out, false);
@@ -380,7 +386,8 @@ class Selection {
   std::span<const MotionRecord> records_;
   const std::vector<Fold>& folds_;
   const SelectionOptions& options_;
-  double reach_rad_ = 0.0;  ///< the farthest recorded bend
+  double reach_rad_ = 0.0;     ///< the farthest recorded bend
+  bool knows_lengths_ = true;  ///< that pressures give, in all records
   mutable std::mutex reporting_;
   Attempt best_;
   std::map<std::string, Attempt> tried_;  ///< single steps from `best_` that did not help
@@ -410,16 +417,6 @@ std::vector<Fold> folds_of(std::span<const MotionRecord> records) {
   return out;
 }
 
-void bend_as_predicted(const SelectedModel& bend, std::vector<Fold>& folds) {
-  for (std::size_t i = 0; i < folds.size(); ++i) {
-    const ResponseModel model(folds[i].unseen);
-    Eigen::MatrixXd u;
-    const ArmHypothesis& arm = bend.by_fold[i];
-    if (!model.simulate(arm, model.longest_step_s(arm), u)) u.setZero();
-    folds[i].unseen.u_rad = u;
-  }
-}
-
 SelectedModel select_terms(const ArmHypothesis& start, ActuationKind kind, const FitChoice& plain,
                            std::span<const MotionRecord> records, const std::vector<Fold>& folds,
                            const SelectionOptions& options) {
@@ -438,6 +435,31 @@ SelectedModel select_terms(const ArmHypothesis& start, ActuationKind kind, const
     for (const MotionRecord& each : fold.seen) few_folds.back().seen.push_back(thinned(each));
   }
   return Selection(start, kind, few, few_folds, options).run(plain);
+}
+
+SelectedArm select_arm(const ArmHypothesis& start, ActuationKind kind, const FitChoice& plain,
+                       std::vector<MotionRecord> records, std::vector<Fold> folds,
+                       const SelectionOptions& options) {
+  SelectionOptions of_lengths = options;
+  IdentifyOptions& identify = of_lengths.identify;
+  identify.refinement.prior = std::max(1.0, identify.refinement.prior);
+  FitChoice lengths;
+  lengths.elongation = true;
+  SelectedArm out;
+  out.lengths = select_terms(start, kind, lengths, records, folds, of_lengths);
+  const auto press = [](MotionRecord& record, const ArmHypothesis& arm) {
+    record.lengths = ResponseModel(record).lengths_of(arm);
+  };
+  for (MotionRecord& record : records) press(record, out.lengths.arm);
+  for (std::size_t i = 0; i < folds.size(); ++i) {
+    press(folds[i].unseen, out.lengths.by_fold[i]);
+    for (MotionRecord& record : folds[i].seen) press(record, out.lengths.by_fold[i]);
+  }
+  out.bend = select_terms(start, kind, plain, records, folds, options);
+  out.bend.arm.elongation = out.lengths.arm.elongation;
+  for (std::size_t i = 0; i < folds.size(); ++i)
+    out.bend.by_fold[i].elongation = out.lengths.by_fold[i].elongation;
+  return out;
 }
 
 std::string selection_text(const SelectedModel& model, double motion, double unit,

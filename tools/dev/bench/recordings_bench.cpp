@@ -46,9 +46,8 @@ struct Found {
   Eigen::Index parameters = 0;
   double seconds = 0.0;
   bool converged = true;
-  ArmHypothesis bend;
-  std::optional<ArmHypothesis> stretch;  ///< none: lengths as configured
-  std::optional<ChordMap> chords;        ///< none: chords of constant curvature
+  ArmHypothesis arm;               ///< without an elongation: lengths as configured
+  std::optional<ChordMap> chords;  ///< none: chords of constant curvature
 };
 
 /// One recording, imported and read.
@@ -176,8 +175,8 @@ class Arena {
       if (!simpler.empty()) options.near.push_back(simpler[found.size()]);
       const auto begin = std::chrono::steady_clock::now();
       const Refinement fit = identify(set, *seen, options);
-      found.push_back({name, set.size(), since(begin), fit.converged, set.arm(fit.x), {}, {}});
-      arms.push_back(found.back().bend);
+      found.push_back({name, set.size(), since(begin), fit.converged, set.arm(fit.x), {}});
+      arms.push_back(found.back().arm);
     }
     report(loaded, others, found[0], {found[1], found[2]}, folds);
     return arms;
@@ -194,40 +193,30 @@ class Arena {
 
   /// Terms chosen by what was not seen.
   void choose(const Loaded& loaded, const std::vector<Loaded>& others) {
-    std::vector<Fold> folds = halves(loaded.record);
-    const std::vector<Fold> judged = folds;
+    const std::vector<Fold> folds = halves(loaded.record);
     const std::span<const MotionRecord> all(&loaded.record, 1);
-    SelectionOptions options;
-    const ActuationKind kind = loaded.experiment.actuation.kind;
     const std::string& name = loaded.recording.name;
-    const auto begin = std::chrono::steady_clock::now();
-    const auto select = [&](const std::string& what, const FitChoice& plain) {
-      options.identify = search(name + ", " + what);
-      options.progress = [&](const std::string& text) {
-        progress_(fmt::format("{}, {}: {}", name, what, text));
-      };
-      return select_terms(configured(loaded.experiment), kind, plain, all, folds, options);
+    SelectionOptions options;
+    options.identify = search(name);
+    options.progress = [&](const std::string& text) {
+      progress_(fmt::format("{}: {}", name, text));
     };
-    FitChoice length;
-    length.elongation = true;
-    const SelectedModel bend = select("bend", plain_choice());
-    bend_as_predicted(bend, folds);
-    const SelectedModel stretch = select("elongation", length);
-    Found whole{"chosen",       bend.trials.front().parameters,
-                since(begin),   bend.whole.converged,
-                bend.arm,       stretch.arm,
-                fit_chords(all)};
-    whole.parameters = bend.whole.x.size() + stretch.whole.x.size();
+    const auto begin = std::chrono::steady_clock::now();
+    const auto [bend, lengths] =
+        select_arm(configured(loaded.experiment), loaded.experiment.actuation.kind, plain_choice(),
+                   {loaded.record}, folds, options);
+    const Found whole{"chosen",     bend.whole.x.size() + lengths.whole.x.size(),
+                      since(begin), bend.whole.converged,
+                      bend.arm,     fit_chords(all)};
     std::vector<Found> parts;
     for (std::size_t i = 0; i < folds.size(); ++i) {
       Found part = whole;
-      part.bend = bend.by_fold[i];
-      part.stretch = stretch.by_fold[i];
+      part.arm = bend.by_fold[i];
       part.chords = fit_chords(folds[i].seen);
       parts.push_back(part);
     }
-    report(loaded, others, whole, parts, judged);
-    report_.choices.push_back({name, bend, stretch});
+    report(loaded, others, whole, parts, folds);
+    report_.choices.push_back({name, bend, lengths});
   }
 
   static double since(std::chrono::steady_clock::time_point begin) {
@@ -249,14 +238,14 @@ class Arena {
                  found.seconds,     found.converged};
     const ResponseModel model(record);
     Eigen::MatrixXd u, length(record.time_s.size(), of.experiment.arm.size());
-    if (!model.simulate(found.bend, model.step_s(found.bend).value_or(1e-3), u)) {
+    if (!model.simulate(found.arm, model.step_s(found.arm).value_or(1e-3), u)) {
       row.score.u_rad = std::numeric_limits<double>::quiet_NaN();
       report_.rows.push_back(row);
       return;
     }
     for (Eigen::Index i = 0; i < length.cols(); ++i)
       length.col(i).setConstant(of.experiment.arm.segments[static_cast<std::size_t>(i)].length_m);
-    if (found.stretch) model.simulate_lengths(*found.stretch, u, length);
+    if (found.arm.elongation.given()) model.simulate_lengths(found.arm, u, length);
     const Eigen::MatrixXd bend = found.chords ? found.chords->bend_rad(u) : u;
     const Eigen::MatrixX3d tip = tips_m(u, chords_m(bend, length));
     const Eigen::Index frames =

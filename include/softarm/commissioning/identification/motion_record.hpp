@@ -18,12 +18,21 @@ struct InputTrack {
   InputTrack averaged(double span_s) const;
 };
 
+/// What is known of the lengths while the bend is identified.
+struct KnownLengths {
+  /// Length of every segment that pressures alone give, m: one row per frame, n columns; empty: not
+  /// known.
+  Eigen::MatrixXd pressed_m;
+  double by_bend_m_per_rad2 = 0.0;  ///< what a bend adds, by |u|^2
+};
+
 /// Measured u and input of a motion.
 struct MotionRecord {
   Eigen::VectorXd time_s;  ///< of the frames that showed every segment, ascending
   Eigen::MatrixXd u_rad;   ///< one row per frame, 2n columns
   /// Origin of S_i in S_{i-1}, m: one row per frame, 3n columns; empty: not recorded.
   Eigen::MatrixXd chord_m;
+  KnownLengths lengths;  ///< by an elongation that was identified before
   InputTrack input;
   double scored_from_s = 0.0;  ///< frames before this time are simulated, but not compared
   /// RMS of a component of u that the noise configured for the frames explains; 0: not known.

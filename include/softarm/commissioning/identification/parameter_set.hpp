@@ -43,6 +43,7 @@ struct FitChoice {
   bool remanence = false;  ///< the rest creeps after use: share, time, and where it is at first
   bool second_remanence = false;  ///< another one that is faster, from rest at first
   bool stiffening = false;        ///< k (1 + s sum p)
+  bool by_length = false;  ///< k (l / L)^p, l as pressures alone give it by a known elongation
   /// Chambers act on the segments nearer the base, too, which their tendons or tubes pass.
   bool cross = false;
   bool mass = false;    ///< one factor on all masses, against the configured ones
@@ -102,7 +103,10 @@ class ParameterSet {
   void add_impedance(const FitChoice& choice);
   void add_gains(const FitChoice& choice);
   void add_times(const FitChoice& choice);
-  void add_lags(const FitChoice& choice);
+  template <class Read, class Write>
+  void add_lags(const char* filling, const char* venting, bool each, Read read, Write write);
+  template <class Of>
+  void add_saturation(const char* name, bool each, Of of);
   void add_memory(const FitChoice& choice);
   void add_masses(const FitChoice& choice);
   void add_elongation(const FitChoice& choice);

@@ -45,7 +45,9 @@ struct ArmHypothesis {
   std::vector<FillVentLag> lags;
   /// Of every input: p counts as p (1 + saturation p). Negative where it saturates.
   Eigen::VectorXd saturation_1pbar;
-  double stiffening_1pbar = 0.0;     ///< k counts as k (1 + s sum of the segment's pressures)
+  double stiffening_1pbar = 0.0;  ///< k counts as k (1 + s sum of the segment's pressures)
+  /// k counts as k (l / L)^this, l by `elongation`, L as configured: what is stretched is taut.
+  double stiffening_by_length = 0.0;
   Eigen::MatrixXd cross_nm_per_bar;  ///< 2n x inputs: forces on segments that a chamber is not in
   std::vector<SlipSpring> slip_springs;  ///< hysteresis, alike in every segment
   Remanence remanence;                   ///< of the rest, alike in every segment
@@ -97,6 +99,8 @@ class ResponseModel {
   [[nodiscard]] bool simulate(const ArmHypothesis& arm, double longest_step_s,
                               Eigen::MatrixXd& u) const;
 
+  /// The lengths by arm.elongation, for a bend that is simulated.
+  KnownLengths lengths_of(const ArmHypothesis& arm) const;
   /// The length of every segment at every frame (n columns), m, by arm.elongation. @param u_rad  of
   /// every frame, 2n columns: as simulated, where lengths are predicted
   void simulate_lengths(const ArmHypothesis& arm, const Eigen::MatrixXd& u_rad,
@@ -104,6 +108,7 @@ class ResponseModel {
 
  private:
   double fastest_1ps(const ArmHypothesis& arm) const;
+  KnownLengths stretching(const ArmHypothesis& arm) const;  ///< empty: stiffness does not follow it
   [[nodiscard]] bool simulate_motion(const ArmHypothesis& arm, double longest_step_s,
                                      Eigen::MatrixXd& u) const;
   [[nodiscard]] bool simulate_balance(const ArmHypothesis& arm, double longest_step_s,

@@ -54,7 +54,7 @@ struct SelectionOptions {
 };
 
 /// Begins with `plain` and adds one term at a time. Of the bend, in the order of the value that they
-/// had on real arms: asymmetric lag, rest, cross-coupling, hysteresis, saturation, lags of every
+/// had on real arms: stiffening by length, asymmetric lag, rest, cross-coupling, hysteresis, saturation, lags of every
 /// chamber, masses (gravity beside k), remanence, delay, stiffening, cubic stiffness. Of the
 /// elongation, which is quick, the best of all that are left each time. What is lowered is
 /// log(error on what was not seen) + `least_gain` times the number of terms: a term stays where the
@@ -69,9 +69,17 @@ SelectedModel select_terms(const ArmHypothesis& start, ActuationKind kind, const
                            std::span<const MotionRecord> records, const std::vector<Fold>& folds,
                            const SelectionOptions& options);
 
-/// Gives the parts not seen the bend that `bend` predicts there, for a selection of the elongation:
-/// lengths may follow the bend, and no measured u may enter what is predicted.
-void bend_as_predicted(const SelectedModel& bend, std::vector<Fold>& folds);
+/// How an arm bends, and how it stretches. The arms of `bend` have the elongation too.
+struct SelectedArm {
+  SelectedModel bend, lengths;
+};
+
+/// First the terms of the lengths, which may follow the measured bend, then those of the bend, whose
+/// stiffness may follow the lengths found. What `bend` predicts comes from pressures alone.
+/// @param records  with chords. @throws std::runtime_error as `select_terms`
+SelectedArm select_arm(const ArmHypothesis& start, ActuationKind kind, const FitChoice& plain,
+                       std::vector<MotionRecord> records, std::vector<Fold> folds,
+                       const SelectionOptions& options);
 
 /// Every term with its price and its gain, for a person.
 std::string selection_text(const SelectedModel& model, double motion, double unit,

@@ -126,6 +126,44 @@ TEST(Lengths, AFreshArmTakesASetAndABentOneIsShorter) {
   EXPECT_NEAR(length(170, 0), 0.1 + 0.25 * stretch - 0.04 * 0.25, 1e-12);
 }
 
+/// Stretches by 20 mm/bar a chamber, of 110 mm; is 30 mm/rad^2 shorter where it bends, and the stiffer
+/// the longer it is.
+ArmHypothesis taut(const Experiment& experiment) {
+  ArmHypothesis out = configured(experiment);
+  out.inertia = false;
+  out.arm.segments[0].damping_nms_per_rad = 0.02;
+  ElongationHypothesis& it = out.elongation;
+  it.offset_m = Eigen::VectorXd::Constant(1, 0.11);
+  it.gain_m_per_bar = Eigen::MatrixXd::Constant(1, 4, 0.02);
+  it.lags.assign(4, FillVentLag{});
+  it.by_bend_m_per_rad2 = -0.03;
+  out.stiffening_by_length = 4.0;
+  return out;
+}
+
+TEST(QuasiStatic, AStretchedSegmentIsStifferByItsLength) {
+  // Settled: gain p = k (l / L)^4 u with l = 0.11 + 0.02 p - 0.03 u^2.
+  ArmHypothesis arm = taut(weightless());
+  const MotionRecord record = pressed(8.0, [](double t) { return t > 0.01 ? 0.8 : 0.0; });
+  const auto left_nm = [&](double u) {
+    const double l = 0.11 + 0.02 * 0.8 - 0.03 * u * u;
+    return 0.8 * arm.input_map.col(2).norm() - std::pow(l / 0.11, 4.0) * u;
+  };
+  Eigen::MatrixXd u;
+  ASSERT_TRUE(ResponseModel(record).simulate(arm, 0.05, u));
+  EXPECT_GT(u.bottomRows<1>().norm(), 0.3);
+  EXPECT_NEAR(left_nm(u.bottomRows<1>().norm()), 0.0, 1e-9);
+  arm.inertia = true;
+  ASSERT_TRUE(ResponseModel(record).simulate(arm, 0.005, u));
+  EXPECT_NEAR(left_nm(u.bottomRows<1>().norm()), 0.0, 1e-6);
+  MotionRecord known = record;  // lengths of another arm, which are known, come first
+  known.lengths = ResponseModel(record).lengths_of(arm);
+  arm.elongation = {};
+  Eigen::MatrixXd same;
+  ASSERT_TRUE(ResponseModel(known).simulate(arm, 0.005, same));
+  EXPECT_EQ(same, u);
+}
+
 TEST(InputTrack, AveragesOfMeasurementsStayOnStraightLines) {
   InputTrack track;
   track.held = false;
@@ -195,6 +233,45 @@ TEST(TermSelection, KeepsWhatIsThereAndLeavesOutWhatIsNot) {
     EXPECT_LE(trial.unseen, best);
     best = trial.unseen;
   }
+}
+
+/// Two chambers of a pair that stretch the arm together and bend it apart.
+TEST(TermSelection, FindsHowStiffnessFollowsTheLength) {
+  const Experiment experiment = weightless();
+  const ArmHypothesis truth = taut(experiment);
+  FitChoice plain;
+  plain.stiffness = plain.inertia = plain.lag = plain.delay = false;
+  plain.gains = GainSharing::arm;
+  MotionRecord record =
+      pressed(20.0, [](double t) { return 0.3 * std::sin(1.1 * t) * std::cos(0.4 * t); });
+  for (Eigen::Index k = 0; k < record.time_s.size(); ++k)
+    record.input.value.row(k).array() += 0.4 + 0.4 * std::sin(0.23 * record.time_s[k]);
+  ASSERT_TRUE(ResponseModel(record).simulate(truth, 0.05, record.u_rad));
+  Eigen::MatrixXd length;
+  ResponseModel(record).simulate_lengths(truth, record.u_rad, length);
+  record.chord_m = chords_m(record.u_rad, length);
+  test::add_noise(record, 5e-4, 0.0, 3);
+  SelectionOptions options;
+  options.identify.refinement.weighted = false;
+  options.identify.refinement.prior = 1.0;
+  options.identify.refinement.threads = 2;
+  const SelectedArm found = select_arm(configured(experiment), ActuationKind::chambers, plain,
+                                       {record}, halves(record), options);
+  EXPECT_TRUE(found.lengths.choice.by_bend);
+  EXPECT_NEAR(found.bend.arm.elongation.by_bend_m_per_rad2, -0.03, 2e-3);
+  EXPECT_TRUE(found.bend.choice.by_length);
+  EXPECT_LT(found.bend.whole.rms_rad, 1e-3);
+  // What was found predicts without what the search knew.
+  Eigen::MatrixXd u;
+  ASSERT_TRUE(ResponseModel(record).simulate(found.bend.arm, 0.05, u));
+  EXPECT_LT((u - record.u_rad).cwiseAbs().maxCoeff(), 0.01);
+  // Where no other term stands in for it, the exponent itself is found.
+  FitChoice alone = plain;
+  alone.by_length = true;
+  record.lengths = ResponseModel(record).lengths_of(truth);
+  const ParameterSet set(configured(experiment), ActuationKind::chambers, alone);
+  const Refinement fit = identify(set, record, options.identify);
+  EXPECT_NEAR(set.arm(fit.x).stiffening_by_length, 4.0, 0.1);
 }
 
 /// Chambers pressed in turn by one sine of 0.2 Hz, behind a delay and nothing else.
@@ -292,6 +369,7 @@ TEST(IdentifiedYaml, HoldsEveryTermAndLoadsAgain) {
   for (int j = 0; j < 6; ++j) arm.lags.push_back({0.1 + 0.1 * j, 0.5 + 0.2 * j});
   arm.saturation_1pbar = Eigen::VectorXd::LinSpaced(6, -0.5, 0.5);
   arm.stiffening_1pbar = 0.2;
+  arm.stiffening_by_length = 3.5;
   arm.cross_nm_per_bar = Eigen::MatrixXd::Random(4, 6);
   arm.slip_springs = {{0.01, 0.3}, {0.05, 0.2}};
   arm.remanence = {0.2, 17.0};
@@ -319,6 +397,7 @@ TEST(IdentifiedYaml, HoldsEveryTermAndLoadsAgain) {
   }
   EXPECT_LT((loaded.saturation_1pbar - arm.saturation_1pbar).norm(), 1e-6);
   EXPECT_NEAR(loaded.stiffening_1pbar, 0.2, 1e-9);
+  EXPECT_NEAR(loaded.stiffening_by_length, 3.5, 1e-9);
   EXPECT_LT((loaded.cross_nm_per_bar - arm.cross_nm_per_bar).norm(), 1e-6);
   ASSERT_EQ(loaded.slip_springs.size(), 2U);
   EXPECT_NEAR(loaded.slip_springs[1].radius_rad, 0.05, 1e-9);
