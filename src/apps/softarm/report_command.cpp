@@ -64,6 +64,15 @@ int report(const ReportOptions& options) {
   return kExitOk;
 }
 
+int tabulate(const std::string& folder) {
+  const RunsTable table = runs_table(folder);
+  fmt::print("{}", table.text);
+  for (const auto& file : table.unreadable)
+    print_error("softarm",
+                file.string() + ": expected the summary of a run, got none that can be read");
+  return table.unreadable.empty() ? kExitOk : kExitFailure;
+}
+
 }  // namespace
 
 void add_report_command(CLI::App& app) {
@@ -78,10 +87,7 @@ void add_report_command(CLI::App& app) {
   add_learned_option(*command, options->learned);
   command->add_flag("!--no-plots", options->plots, "do not draw the plots");
   run_where_given(*command, [options]() -> int {
-    if (std::filesystem::is_directory(options->log)) {
-      fmt::print("{}", runs_table(options->log));
-      return kExitOk;
-    }
+    if (std::filesystem::is_directory(options->log)) return tabulate(options->log);
     if (options->config.empty()) throw CLI::RequiredError("CONFIG");
     return report(*options);
   });
