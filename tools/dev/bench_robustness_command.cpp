@@ -28,18 +28,8 @@ Experiment shipped(const std::string& name) { return load_experiment(shipped_con
 
 /// The worst of every figure.
 void join(RobustnessTrial& worst, const RobustnessTrial& other) {
-  const auto larger = [](double& a, double b) {
-    if (!(b <= a)) a = b;
-  };
-  larger(worst.u_rms_rad, other.u_rms_rad);
-  larger(worst.u_largest_rad, other.u_largest_rad);
-  larger(worst.tip_rms_m, other.tip_rms_m);
-  larger(worst.e_rms_m, other.e_rms_m);
-  larger(worst.pressure_rate_bar_per_s, other.pressure_rate_bar_per_s);
-  larger(worst.tick_us, other.tick_us);
-  larger(worst.frame_tick_us, other.frame_tick_us);
-  larger(worst.nis, other.nis);
-  larger(worst.surprised, other.surprised);
+  for (const auto& [label, figure] : kRobustnessFigures)
+    if (!(other.*figure <= worst.*figure)) worst.*figure = other.*figure;
   worst.stayed_active &= other.stayed_active;
 }
 
