@@ -7,7 +7,10 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <cerrno>
 #include <chrono>
+#include <cstdio>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
@@ -21,9 +24,9 @@ namespace softarm {
 class ChildProcess {
  public:
   /// Starts `program`: a path, or a name that PATH knows. What it prints goes to the file `output`.
-  /// A program that cannot be started ends with exit code 127. When this object, or the thread that
-  /// made it, ends, it gets the signal `at_end` and its end is awaited; a terminal's Ctrl-C does not
-  /// reach it.
+  /// One that cannot be started prints why and ends with exit code 127. When this object, or the
+  /// thread that made it, ends, it gets the signal `at_end` and its end is awaited; a terminal's
+  /// Ctrl-C does not reach it.
   ChildProcess(const std::string& program, const std::vector<std::string>& arguments,
                std::string output, int at_end = SIGKILL)
       : output_(std::move(output)), at_end_(at_end) {
@@ -40,6 +43,7 @@ class ChildProcess {
     dup2(file, STDERR_FILENO);
     close_range(STDERR_FILENO + 1, ~0U, CLOSE_RANGE_CLOEXEC);  // sockets are not inherited
     execvp(program.c_str(), argv.data());
+    dprintf(STDERR_FILENO, "%s: %s\n", program.c_str(), std::strerror(errno));
     _exit(127);
   }
   ~ChildProcess() {
