@@ -17,6 +17,7 @@
 #include <sstream>
 #include <string_view>
 
+#include "softarm/base/form.hpp"
 #include "softarm/base/instance_lock.hpp"
 #include "softarm/base/output_file.hpp"
 #include "softarm/base/version.hpp"
@@ -111,7 +112,7 @@ CLI::Validator number_between(double low, double high) {
 }
 
 CLI::Validator seed_number() {
-  static constexpr std::uint64_t kLargest = 1ULL << 53;
+  static constexpr auto kLargest = static_cast<std::uint64_t>(kLargestWhole);
   const auto check = [](std::string& text) -> std::string {
     std::uint64_t seed = 0;
     const auto [end, code] = std::from_chars(text.data(), text.data() + text.size(), seed);
@@ -136,6 +137,17 @@ CLI::Validator positive_seconds() {
 
 void print_error(const std::string& program, const std::string& message) {
   say(fmt::format("{}: error: {}\n", program, message));
+}
+
+int fail(const std::string& program, ExitCode code, const std::string& message) {
+  print_error(program, message);
+  return code;
+}
+
+void run_where_given(CLI::App& command, const std::function<int()>& body) {
+  command.callback([body] {
+    if (const int code = body(); code != kExitOk) throw CLI::RuntimeError(code);
+  });
 }
 
 int run_program(int argc, char** argv, CLI::App& app, const std::function<int()>& body) {

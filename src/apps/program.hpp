@@ -58,6 +58,11 @@ CLI::Validator seed_number();
 
 /// Prints "NAME: error: MESSAGE" on stderr.
 void print_error(const std::string& program, const std::string& message);
+/// The same, for who ends with it. @return code
+int fail(const std::string& program, ExitCode code, const std::string& message);
+
+/// Runs `body` where the sub-command is given; what it returns is the program's exit code.
+void run_where_given(CLI::App& command, const std::function<int()>& body);
 
 /// Adds --version, parses, then runs `body` and returns its exit code; errors become a message and
 /// the code above. The callback of a sub-command runs while parsing, before `body`; it may throw

@@ -93,8 +93,7 @@ int serve(const std::string& program, const std::string& path) {
   try {
     backend = make_valve_backend(valves, experiment.actuation.max_pressure_bar);
   } catch (const std::invalid_argument& error) {
-    print_error(program, fmt::format("{}: {}", path, error.what()));
-    return kExitConfiguration;
+    return fail(program, kExitConfiguration, fmt::format("{}: {}", path, error.what()));
   }
   const InstanceLock commands_lock(lock_name("valves of " + lcm.command_channel, lcm.url));
   const InstanceLock measurement_lock(lock_name(lcm.measurement_channel, lcm.url));
@@ -110,11 +109,10 @@ int serve(const std::string& program, const std::string& path) {
     say(fmt::format("{}: warning: {}\n", program, warning));
   ValveDriver driver(guard_settings(experiment), std::move(backend));
   if (drive(program, experiment, driver)) return kExitOk;
-  print_error(program,
+  return fail(program, kExitFailure,
               fmt::format("measured pressures did not fall to {} bar; the valves vent by their own "
                           "time-out of {} s",
                           valves.vented_bar, valves.failsafe_timeout_s));
-  return kExitFailure;
 }
 
 }  // namespace

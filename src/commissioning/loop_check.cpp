@@ -36,12 +36,10 @@ double blow_at_s(const Experiment& e) {
 
 /// A force that bends the softest segment by kBlowPart rad or so if it lasted.
 ExternalLoad blow(const Experiment& e) {
-  double length_m = 0.0, stiffness_nm = kInfinity;
-  for (const SegmentParameters& segment : e.plant.arm.segments) {
-    length_m += segment.length_m;
+  double stiffness_nm = kInfinity;
+  for (const SegmentParameters& segment : e.plant.arm.segments)
     stiffness_nm = std::min(stiffness_nm, segment.stiffness_nm_per_rad);
-  }
-  const double size_n = kBlowPart * std::max(stiffness_nm, 1e-3) / length_m;
+  const double size_n = kBlowPart * std::max(stiffness_nm, 1e-3) / e.plant.arm.length_m();
   ExternalLoad load;
   load.force_n = Eigen::Vector3d(size_n, 0.5 * size_n, 0.0);
   load.shape = LoadShape::half_sine;

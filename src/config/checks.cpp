@@ -3,6 +3,7 @@
 #include <arpa/inet.h>
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cctype>
 #include <cmath>
 #include <cstring>
@@ -11,7 +12,6 @@
 #include <stdexcept>
 
 #include "config/describe.hpp"
-#include "config/plausibility.hpp"
 #include "softarm/actuation/pressure_allocator.hpp"
 #include "softarm/base/time.hpp"
 #include "softarm/control/control_laws.hpp"
@@ -25,8 +25,16 @@
 namespace softarm {
 namespace {
 
-/// A stop vents within this time, whatever the pressures were.
-constexpr double kLongestVent_s = 1.0;
+/// A stop vents within this time, whatever the pressures were, with all that comes before and after
+/// the ramp.
+constexpr double kLongestStop_s = 1.0;
+constexpr int kTicksOfAStop = 4;  ///< one until it is noticed, three zero commands at the end
+/// With real valves, whatever the derived thresholds would be.
+constexpr double kLongestHold_s = 0.25;
+constexpr double kLongestVentDelay_s = 0.5;
+constexpr int kFramesATick = 64;  ///< that the daemon takes
+constexpr double kMostGravity_mps2 = 20.0;
+constexpr double kMostBend_rad = 20.0;  ///< of one chamber at full pressure against the spring
 constexpr double kRotationTolerance = 1e-6;
 constexpr double kInPlane_rad = 1e-6;
 /// Work of the inverse in the tick grows with their square.
@@ -34,21 +42,29 @@ constexpr std::size_t kMaxPlays = 16;
 
 std::string in_quotes(const std::string& text) { return "\"" + text + "\""; }
 
+/// For messages.
+std::string size_of(const auto& list) { return fmt::format("{}", list.size()); }
+
+std::string with_unit(const std::string& key, double value) {
+  const std::string_view unit = Key{key.c_str(), ""}.unit();
+  return fmt::format("{:.6g}{}{}", value, unit.empty() ? "" : " ", unit);
+}
+
 class Checks {
  public:
   Checks(const Experiment& experiment, const ConfigKeys& keys)
       : experiment_(experiment), keys_(keys) {}
 
   void run() const {
-    check_rotation("arm.base.rotation", experiment_.arm.base_rotation);
+    check_rotation("arm.base.rotation", arm_.base_rotation);
     check_rotation("plant.arm.base.rotation", experiment_.plant.arm.base_rotation);
-    check_rotation("daemon.mocap.axes", experiment_.transport.mocap.axes);
-    check_radius("arm", experiment_.arm, false);
+    check_rotation("daemon.mocap.axes", transport_.mocap.axes);
+    check_radius("arm", arm_, false);
     check_radius("plant.arm", experiment_.plant.arm,
                  experiment_.plant.kind.get_if<LinkSettings>() != nullptr);
-    if (experiment_.arm.extensible) check_stretching_control();
+    if (arm_.extensible) check_stretching_control();
     check_plant();
-    check_actuation("actuation", experiment_.actuation);
+    check_actuation("actuation", actuation_);
     check_actuation("plant.actuation", experiment_.plant.actuation);
     check_same_chambers();
     check_bodies();
@@ -59,12 +75,16 @@ class Checks {
     check_loads();
     check_contact();
     check_module("control", "settings the controller can use", [&] {
-      experiment_.control.law.make(
-          {experiment_.arm, experiment_.control, chamber_count(experiment_.actuation)});
+      control_.law.make({arm_, control_, chamber_count(actuation_)});
     });
     check_inverse();
     check_reference();
-    if (experiment_.control.repetition.lead_s > 0.0) check_repetition();
+    if (control_.repetition.lead_s > 0.0) check_repetition();
+    // What the form of each key allows, but cannot be meant: mostly slips of units.
+    check_slips_of_the_arm();
+    check_marker_frames();
+    check_tick();
+    if (drives_real_valves(experiment_)) check_times();
   }
 
  private:
@@ -72,14 +92,16 @@ class Checks {
                const std::string& got) const {
     if (!holds) throw keys_.error_at(key, expected, got);
   }
+  /// Of a number in the unit of the key.
+  void require(bool holds, const std::string& key, const std::string& expected, double got) const {
+    require(holds, key, expected, with_unit(key, got));
+  }
 
   /// Compares a key's value with a bound; `what` names the bound, `why` gives the reason.
   void compare(bool holds, const char* relation, const std::string& key, double value, double bound,
                const char* what, const char* why) const {
-    const std::string_view unit = Key{key.c_str(), ""}.unit();
-    const std::string unit_behind = unit.empty() ? "" : fmt::format(" {}", unit);
-    require(holds, key, fmt::format("{} {} ({:.6g}{}){}", relation, what, bound, unit_behind, why),
-            fmt::format("{:.6g}{}", value, unit_behind));
+    require(holds, key, fmt::format("{} {} ({}){}", relation, what, with_unit(key, bound), why),
+            value);
   }
   void at_least(const std::string& key, double value, double bound, const char* what) const {
     compare(value >= bound, "at least", key, value, bound, what, "");
@@ -93,10 +115,19 @@ class Checks {
     compare(value < bound, "less than", key, value, bound, what, why);
   }
 
-  template <typename Set, typename Item>
-  void once(Set& seen, const Item& item, const std::string& key, const std::string& expected,
-            const std::string& got) const {
-    require(seen.insert(item).second, key, expected, got);
+  void check_address(const std::string& key, const std::string& text) const {
+    in_addr address{};
+    require(inet_pton(AF_INET, text.c_str(), &address) == 1, key,
+            "an IPv4 address such as 192.168.1.20", in_quotes(text));
+  }
+
+  /// Calls check(key, frame) for every body.
+  template <typename Check>
+  void for_marker_frames(const Check& check) const {
+    const BodySettings& bodies = transport_.bodies;
+    if (bodies.base_id >= 0) check("daemon.bodies.base_plate", bodies.base_marker_frame);
+    for (const MarkerFrameSettings& frame : bodies.segment_marker_frames)
+      check("daemon.bodies.segment_plates", frame);
   }
 
   /// Errors thrown by the modules, such as a map of chambers that cannot reach every direction.
@@ -133,34 +164,30 @@ class Checks {
     const auto no = [&](bool holds, const char* with) {
       require(!holds, key, fmt::format("false with {}", with), "segments that stretch");
     };
-    no(experiment_.arm.size() > kMaxStretchingSegments, "more than 85 segments");
-    no(experiment_.arm.actuation == ActuationModel::couple,
+    no(arm_.size() > kMaxStretchingSegments, "more than 85 segments");
+    no(arm_.actuation == ActuationModel::couple,
        "actuation_model: couple, which has no axial force");
-    no(experiment_.actuation.kind == ActuationKind::torque,
-       "actuation by torque, which has no axial force");
-    no(experiment_.actuation.plane_rad.has_value(), "actuation.plane_rad");
-    no(experiment_.control.coordinates == ControlCoordinates::polar, "control.coordinates: polar");
-    no(!experiment_.control.law.get_if<CurvatureLaw>() &&
-           !experiment_.control.law.get_if<StaticsPiLaw>() &&
-           !experiment_.control.law.get_if<ExternalLaw>(),
+    no(actuation_.kind == ActuationKind::torque, "actuation by torque, which has no axial force");
+    no(actuation_.plane_rad.has_value(), "actuation.plane_rad");
+    no(control_.coordinates == ControlCoordinates::polar, "control.coordinates: polar");
+    no(!control_.law.get_if<CurvatureLaw>() && !control_.law.get_if<StaticsPiLaw>() &&
+           !control_.law.get_if<ExternalLaw>(),
        "a control.law that knows no axial force");
     for (const ReferencePhase& phase : experiment_.reference.phases)
       no(phase.kind.get_if<LiveTipReference>() != nullptr, "reference: live_tip");
-    no(experiment_.estimation.method == CurvatureMethod::orientation,
+    no(estimation_.method == CurvatureMethod::orientation,
        "estimation.method: orientation, which measures no lengths");
-    for (const SegmentParameters& segment : experiment_.arm.segments) {
-      if (segment.constant_length) continue;
-      above("arm.axial_stiffness_n_per_m", segment.axial_stiffness_n_per_m, 0.0, "zero",
-            " where segments stretch");
-      above("arm.axial_damping_ns_per_m", segment.axial_damping_ns_per_m, 0.0, "zero",
-            " where segments stretch");
-    }
-    const SegmentScalars natural_m = straight_elongation(experiment_.arm, experiment_.actuation,
-                                                         experiment_.actuation.bias_pressure_bar);
-    for (int i = 0; i < experiment_.arm.size(); ++i) {
-      const double length_m = experiment_.arm.segments[static_cast<std::size_t>(i)].length_m;
-      above("estimation.length_tolerance", experiment_.estimation.length_tolerance,
-            std::abs(natural_m[i]) / length_m, "the elongation by the bias pressures",
+    const SegmentScalars natural_m =
+        straight_elongation(arm_, actuation_, actuation_.bias_pressure_bar);
+    for (int i = 0; i < arm_.size(); ++i) {
+      const SegmentParameters& segment = arm_.segments[static_cast<std::size_t>(i)];
+      const char* why = " where segments stretch";
+      if (!segment.constant_length) {
+        above("arm.axial_stiffness_n_per_m", segment.axial_stiffness_n_per_m, 0.0, "zero", why);
+        above("arm.axial_damping_ns_per_m", segment.axial_damping_ns_per_m, 0.0, "zero", why);
+      }
+      above("estimation.length_tolerance", estimation_.length_tolerance,
+            std::abs(natural_m[i]) / segment.length_m, "the elongation by the bias pressures",
             ": otherwise every frame is rejected");
     }
   }
@@ -172,7 +199,7 @@ class Checks {
                 (plant.valves.lag_s > 0.0 && plant.actuation.kind == ActuationKind::chambers),
             "plant.valves.supply_sag_s",
             "0 s where plant.valves.lag_s is 0 s or actuation is by torque",
-            fmt::format("{} s", plant.valves.supply_sag_s));
+            plant.valves.supply_sag_s);
     const auto make = [&] { plant.kind.make(plant); };
     if (plant.material.bends_otherwise())
       check_module("plant.material", "a kind of plant that has these terms, such as pcc", make);
@@ -180,7 +207,7 @@ class Checks {
          {std::pair("plant.material.axial_remanence", plant.material.axial_remanence),
           std::pair("plant.material.axial_remanence_2", plant.material.axial_remanence_2)})
       require(part == 0.0 || plant.arm.extensible, key, "0 where plant.arm.extensible is false",
-              fmt::format("{}", part));
+              part);
     if (!plant.arm.extensible) return;
     require(plant.arm.actuation == ActuationModel::chamber, "plant.arm.extensible",
             "false with actuation_model: couple, which has no axial force",
@@ -193,66 +220,60 @@ class Checks {
     const bool torque = it.kind == ActuationKind::torque;
     above(key + ".max_pressure_bar", high, low, "min_pressure_bar");
     require(low <= bias && bias <= high, key + ".bias_pressure_bar",
-            fmt::format("between min and max_pressure_bar ([{}, {}] bar)", low, high),
-            fmt::format("{} bar", bias));
+            fmt::format("between min and max_pressure_bar ([{}, {}] bar)", low, high), bias);
     above(key + (torque ? ".vent_nm_per_s" : ".vent_bar_per_s"), it.vent_bar_per_s,
-          std::max(high, -low) / kLongestVent_s, "what it takes to vent in less than 1 s");
+          std::max(high, -low) / kLongestStop_s, "what it takes to vent in less than 1 s");
     const std::size_t fewest = it.plane_rad ? 2 : 3;
-    for (const auto& chambers : it.segments) {
-      require(
-          torque || chambers.size() >= fewest, key + ".chambers",
-          fmt::format("at least {} chambers a segment{}", fewest,
-                      it.plane_rad ? " of a planar arm" : " (2 for a planar arm with plane_rad)"),
-          fmt::format("{}", chambers.size()));
-    }
+    const char* of = it.plane_rad ? " of a planar arm" : " (2 for a planar arm with plane_rad)";
+    for (const auto& chambers : it.segments)
+      require(torque || chambers.size() >= fewest, key + ".chambers",
+              fmt::format("at least {} chambers a segment{}", fewest, of), size_of(chambers));
     check_module(key + ".chambers", "chambers that reach every direction the arm needs",
                  [&] { PressureAllocator allocator(it); });
   }
 
   void check_same_chambers() const {
-    const auto& model = experiment_.actuation;
-    const auto& plant = experiment_.plant.actuation;
-    const bool torque = model.kind == ActuationKind::torque;
-    require(plant.kind == model.kind, "plant.actuation.kind", "the same as actuation.kind",
+    const ActuationSettings& plant = experiment_.plant.actuation;
+    const bool torque = actuation_.kind == ActuationKind::torque;
+    require(plant.kind == actuation_.kind, "plant.actuation.kind", "the same as actuation.kind",
             torque ? "chambers" : "torque");
-    require(!torque || !experiment_.safety.valve_readback, "daemon.safety.valve_readback",
+    require(!torque || !safety_.valve_readback, "daemon.safety.valve_readback",
             "false with actuation by torque: it is for simulated arms, which have no valves then",
             "true");
-    for (std::size_t i = 0; i < model.segments.size(); ++i) {
-      const auto expected = model.segments[i].size(), got = plant.segments[i].size();
-      require(expected == got, "plant.actuation.chambers",
+    for (std::size_t i = 0; i < actuation_.segments.size(); ++i) {
+      const auto expected = actuation_.segments[i].size();
+      require(expected == plant.segments[i].size(), "plant.actuation.chambers",
               fmt::format("as many as actuation.chambers ({}) in segment {}", expected, i + 1),
-              fmt::format("{}", got));
+              size_of(plant.segments[i]));
     }
   }
 
   void check_inverse() const {
     const ActuatorInverseSettings& inverse = experiment_.actuator_inverse;
     require(inverse.play_bar.size() <= kMaxPlays, "actuation.inverse.play_bar",
-            fmt::format("at most {} half widths", kMaxPlays),
-            fmt::format("{}", inverse.play_bar.size()));
+            fmt::format("at most {} half widths", kMaxPlays), size_of(inverse.play_bar));
     const auto springs = inverse.slip_radius_rad.size();
     require(springs == inverse.slip_stiffness_nm_per_rad.size() && springs <= kMaxPlays,
             "actuation.inverse.slip_stiffness_nm_per_rad",
             fmt::format("as many as slip_radius_rad ({}), at most {}", springs, kMaxPlays),
-            fmt::format("{}", inverse.slip_stiffness_nm_per_rad.size()));
-    require(!inverse.learn_hysteresis || experiment_.estimation.observer == ObserverKind::model,
+            size_of(inverse.slip_stiffness_nm_per_rad));
+    require(!inverse.learn_hysteresis || estimation_.observer == ObserverKind::model,
             "actuation.inverse.learn_hysteresis",
             "false without estimation.observer: model, which sees what is left over", "true");
     if (inverse.lags())
-      above("control.valve_lag_s", experiment_.control.valve_lag_s, 0.0, "zero",
+      above("control.valve_lag_s", control_.valve_lag_s, 0.0, "zero",
             ", the lag that the inverse of the chambers' lags leaves");
   }
 
   void check_reference() const {
     try {
-      Reference(experiment_.reference, experiment_.control, experiment_.arm);
+      Reference(experiment_.reference, control_, arm_);
     } catch (const ReferenceError& error) {
       throw keys_.error_at(error.key, error.expected, error.got);
     } catch (const std::invalid_argument& error) {
       throw keys_.error_at("reference", "a reference that can be followed", error.what());
     }
-    if (!experiment_.actuation.plane_rad) return;
+    if (!actuation_.plane_rad) return;
     const auto& phases = experiment_.reference.phases;
     for (std::size_t i = 0; i < phases.size(); ++i) {
       const std::string key = fmt::format("reference[{}]", i);
@@ -273,15 +294,14 @@ class Checks {
   void check_repetition() const {
     const char* key = "control.repetition.lead_s";
     const char* period_key = "control.repetition.period_s";
-    const RepetitionSettings& it = experiment_.control.repetition;
+    const RepetitionSettings& it = control_.repetition;
     const auto zero_unless = [&](bool holds, const char* what) {
-      require(holds, key, fmt::format("0 s without {}", what), fmt::format("{} s", it.lead_s));
+      require(holds, key, fmt::format("0 s without {}", what), it.lead_s);
     };
-    zero_unless(experiment_.estimation.observer == ObserverKind::model,
-                "estimation.observer: model");
-    zero_unless(experiment_.control.disturbance == DisturbanceRejection::cancel,
+    zero_unless(estimation_.observer == ObserverKind::model, "estimation.observer: model");
+    zero_unless(control_.disturbance == DisturbanceRejection::cancel,
                 "control.disturbance: cancel");
-    zero_unless(experiment_.control.law.get_if<ExternalLaw>() == nullptr,
+    zero_unless(control_.law.get_if<ExternalLaw>() == nullptr,
                 "a control.law that cancels disturbances");
     bool repeats = false;
     for (const ReferencePhase& phase : experiment_.reference.phases) {
@@ -289,8 +309,7 @@ class Checks {
       repeats |= used_s > 0.0;
       if (!(used_s > 0.0)) continue;
       require(own_s == 0.0 || whole_periods(used_s, own_s), period_key,
-              fmt::format("a whole number of periods of the reference ({:.6g} s)", own_s),
-              fmt::format("{:.6g} s", used_s));
+              fmt::format("a whole number of periods of the reference ({:.6g} s)", own_s), used_s);
       below(key, it.lead_s, 0.5 * used_s, "half of the period");
       const double shortest_s = RepetitiveCompensation::kNodes / experiment_.rate_hz;
       at_least(it.period_s ? period_key : key, used_s, shortest_s,
@@ -298,12 +317,12 @@ class Checks {
     }
     require(repeats, key,
             "0 s where no phase of the reference repeats (or else its control.repetition.period_s)",
-            fmt::format("{} s", it.lead_s));
+            it.lead_s);
   }
 
   /// Of a planar arm.
   void check_in_plane(const std::string& key, const std::vector<double>& u) const {
-    const double plane = *experiment_.actuation.plane_rad;
+    const double plane = *actuation_.plane_rad;
     for (std::size_t i = 0; i + 1 < u.size(); i += 2) {
       const double outside = std::abs(u[i + 1] * std::cos(plane) - u[i] * std::sin(plane));
       require(outside < kInPlane_rad, key, "a bend in the plane of actuation.plane_rad",
@@ -312,28 +331,25 @@ class Checks {
   }
 
   void check_bodies() const {
-    const BodySettings& bodies = experiment_.transport.bodies;
+    const BodySettings& bodies = transport_.bodies;
     std::set<int> seen;
-    for (const int id : bodies.segment_ids) {
-      once(seen, id, "daemon.bodies.segment_ids", "every body once",
-           fmt::format("body {} twice", id));
-    }
-    if (bodies.base_id < 0) return;
-    once(seen, bodies.base_id, "daemon.bodies.base_id", "a body that is no segment's end",
-         fmt::format("{}", bodies.base_id));
+    for (const int id : bodies.segment_ids)
+      require(seen.insert(id).second, "daemon.bodies.segment_ids", "every body once",
+              fmt::format("body {} twice", id));
+    require(bodies.base_id < 0 || !seen.contains(bodies.base_id), "daemon.bodies.base_id",
+            "a body that is no segment's end", bodies.base_id);
   }
 
   /// A threshold that another one hides never takes effect, so it protects nothing.
   void check_safety() const {
-    const SafetySettings& it = experiment_.safety;
+    const SafetySettings& it = safety_;
     const double tick_s = 1.0 / experiment_.rate_hz;
     const SafetyThresholds resolved = resolve_thresholds(it, tick_s);
     const double hold_s = to_seconds(resolved.hold_after_ns);
     const double vent_s = to_seconds(resolved.vent_after_ns);
-    if (it.vent_after_s == 0.0 && it.hold_after_s > 0.0) {
+    if (it.vent_after_s == 0.0 && it.hold_after_s > 0.0)
       below("daemon.safety.hold_after_s", hold_s, vent_s, "vent_after_s, left out",
             ": otherwise HOLD is never reached; give both");
-    }
     above("daemon.safety.vent_after_s", vent_s, hold_s, "hold_after_s",
           ": otherwise HOLD is never reached; give both");
     above("daemon.safety.hold_after_s", hold_s, it.frame_period_s + it.frame_latency_s,
@@ -342,14 +358,12 @@ class Checks {
           ": otherwise they never cause HOLD");
     at_least("daemon.safety.max_latency_s", it.max_latency_s, it.frame_latency_s,
              "frame_latency_s");
-    above("estimation.max_speed_radps", experiment_.estimation.max_speed_radps,
-          experiment_.control.max_speed_radps, "control.max_speed_radps",
-          ": otherwise frames are rejected before that limit is seen");
-    if (it.valve_readback) {
+    above("estimation.max_speed_radps", estimation_.max_speed_radps, control_.max_speed_radps,
+          "control.max_speed_radps", ": otherwise frames are rejected before that limit is seen");
+    if (it.valve_readback)
       below("daemon.safety.pressure_tolerance_bar", it.pressure_tolerance_bar,
-            experiment_.actuation.max_pressure_bar, "actuation.max_pressure_bar",
+            actuation_.max_pressure_bar, "actuation.max_pressure_bar",
             ": otherwise no leak is ever seen");
-    }
     for (const auto& [key, time_s] : {std::pair("safety.valve_silence_s", it.valve_silence_s),
                                       std::pair("safety.deadman_timeout_s", it.deadman_timeout_s),
                                       std::pair("lcm.command_validity_s", it.command_validity_s)})
@@ -365,27 +379,21 @@ class Checks {
     });
     require(plain, key, "letters, digits, _ - . /", in_quotes(word));
     require(channel.size() <= 63, key, "a channel of at most 63 characters", channel);
-    once(seen, channel, key, "a separate channel",
-         in_quotes(channel) + ", which another key names too");
+    require(seen.insert(channel).second, key, "a separate channel",
+            in_quotes(channel) + ", which another key names too");
   }
 
   void check_lcm() const {
-    const TransportSettings& transport = experiment_.transport;
     std::set<std::string> seen;
     for (const ChannelKey& it : kChannelKeys) {
-      const std::string& name = transport.lcm.*it.channel;
+      const std::string& name = transport_.lcm.*it.channel;
       if (!name.empty()) check_channel(seen, fmt::format("daemon.lcm.{}", it.name), name, name);
     }
-    if (transport.mocap.source.channel_per_body) {  // every body has its own
-      const auto check = [&](const char* key, const MarkerFrameSettings& body) {
-        check_channel(seen, key, body.name, body_channel(transport.lcm, body));
-      };
-      const BodySettings& bodies = transport.bodies;
-      if (bodies.base_id >= 0) check("daemon.bodies.base_plate.name", bodies.base_marker_frame);
-      for (const auto& body : bodies.segment_marker_frames)
-        check("daemon.bodies.segment_plates", body);
-    }
-    const std::string& url = transport.lcm.url;
+    if (transport_.mocap.source.channel_per_body)
+      for_marker_frames([&](const std::string& key, const MarkerFrameSettings& frame) {
+        check_channel(seen, key + ".name", frame.name, body_channel(transport_.lcm, frame));
+      });
+    const std::string& url = transport_.lcm.url;
     const std::string example = ", such as udpm://239.255.76.67:7667?ttl=0";
     require(url.find("://") != std::string::npos, "daemon.lcm.url", "an LCM provider" + example,
             in_quotes(url));
@@ -397,14 +405,8 @@ class Checks {
   }
 
   void check_mocap_server() const {
-    const TransportSettings& transport = experiment_.transport;
-    if (!transport.mocap.source.network) return;
-    const MocapNetworkSettings& it = transport.mocap.network;
-    const auto check_address = [&](const char* key, const std::string& text) {
-      in_addr address{};
-      require(inet_pton(AF_INET, text.c_str(), &address) == 1, key,
-              "an IPv4 address such as 192.168.1.20", in_quotes(text));
-    };
+    if (!transport_.mocap.source.network) return;
+    const MocapNetworkSettings& it = transport_.mocap.network;
     check_address("daemon.mocap.host", it.host);
     check_address("daemon.mocap.local_address", it.local_address);
     if (!it.multicast.empty()) check_address("daemon.mocap.multicast", it.multicast);
@@ -415,81 +417,157 @@ class Checks {
                          });
     require(numbers, "daemon.mocap.version", "two numbers such as 4.1", in_quotes(it.version));
     std::set<std::string> seen;
-    const BodySettings& bodies = transport.bodies;
-    const auto check_name = [&](const char* key, const std::string& name) {
-      if (!name.empty()) once(seen, name, key, "every body once", in_quotes(name) + " twice");
-    };
-    if (bodies.base_id >= 0)
-      check_name("daemon.bodies.base_plate.name", bodies.base_marker_frame.name);
-    for (const MarkerFrameSettings& body : bodies.segment_marker_frames)
-      check_name("daemon.bodies.segment_plates", body.name);
+    for_marker_frames([&](const std::string& key, const MarkerFrameSettings& frame) {
+      require(frame.name.empty() || seen.insert(frame.name).second, key + ".name",
+              "every body once", in_quotes(frame.name) + " twice");
+    });
   }
 
   void check_valves() const {
     const ValveDriverSettings& it = experiment_.valves;
-    const double max_bar = experiment_.actuation.max_pressure_bar;
     // Arms without a terminal need not fit one.
-    if (experiment_.actuation.kind == ActuationKind::torque || !keys_.given("valves")) return;
+    if (actuation_.kind == ActuationKind::torque || !keys_.given("valves")) return;
     std::set<int> seen;
     for (const int valve : it.order)
-      once(seen, valve, "valves.order", "every valve once", fmt::format("valve {} twice", valve));
+      require(seen.insert(valve).second, "valves.order", "every valve once",
+              fmt::format("valve {} twice", valve));
     const double period_s = 1.0 / it.rate_hz;
     const double silent_s = (it.tolerated_failures + 1) * period_s;
     below("valves.response_timeout_s", it.response_timeout_s, period_s,
           "one period of valves.rate_hz");
     at_least("valves.longest_backoff_s", it.longest_backoff_s, it.backoff_s, "backoff_s");
-    below("valves.stuck_bar", it.stuck_bar, max_bar, "actuation.max_pressure_bar",
-          ": otherwise no valve ever counts as stuck");
+    below("valves.stuck_bar", it.stuck_bar, actuation_.max_pressure_bar,
+          "actuation.max_pressure_bar", ": otherwise no valve ever counts as stuck");
     require(it.failsafe_timeout_s >= silent_s, "valves.failsafe_timeout_s",
             fmt::format("at least {:.6g} s (tolerated_failures + 1 periods)", silent_s),
-            fmt::format("{} s", it.failsafe_timeout_s));
+            it.failsafe_timeout_s);
     if (it.backend == "modbus") check_terminal(it);
   }
 
   void check_terminal(const ValveDriverSettings& it) const {
-    in_addr address{};
-    require(inet_pton(AF_INET, it.host.c_str(), &address) == 1, "valves.host", "an IPv4 address",
-            in_quotes(it.host));
+    check_address("valves.host", it.host);
     require(it.failsafe_timeout_s >= it.registers.timeout_least_s, "valves.failsafe_timeout_s",
             fmt::format("at least {:.6g} s, what the terminal takes", it.registers.timeout_least_s),
-            fmt::format("{} s", it.failsafe_timeout_s));
+            it.failsafe_timeout_s);
     const double units = it.failsafe_timeout_s / it.registers.timeout_unit_s;
     require(units >= 0.5 && units < (it.registers.timeout_words == 2 ? 4294967295.0 : 65535.0),
             "valves.failsafe_timeout_s", "a time-out that fits its register",
             fmt::format("{:.6g} units", units));
     const std::string fault =
-        register_map_fault(it.registers, it.order, experiment_.actuation.max_pressure_bar);
+        register_map_fault(it.registers, it.order, actuation_.max_pressure_bar);
     require(fault.empty(), "valves.registers", "registers that fit together", fault);
   }
 
   void check_contact() const {
-    require(experiment_.safety.contact_segment <= experiment_.arm.size(),
-            "daemon.safety.contact_segment", fmt::format("at most {}", experiment_.arm.size()),
-            fmt::format("{}", experiment_.safety.contact_segment));
-    require(experiment_.safety.contact_force_n <= 0.0 ||
-                experiment_.estimation.observer == ObserverKind::model,
+    require(safety_.contact_segment <= arm_.size(), "daemon.safety.contact_segment",
+            fmt::format("at most {}", arm_.size()), safety_.contact_segment);
+    require(safety_.contact_force_n <= 0.0 || estimation_.observer == ObserverKind::model,
             "daemon.safety.contact_force_n", "0 without estimation.observer: model",
-            fmt::format("{}", experiment_.safety.contact_force_n));
+            safety_.contact_force_n);
   }
 
   void check_loads() const {
     const auto& loads = experiment_.plant.loads;
-    const int n = experiment_.arm.size();
-    for (std::size_t i = 0; i < loads.size(); ++i) {
-      require(loads[i].segment <= n, fmt::format("plant.loads[{}].segment", i),
-              fmt::format("a whole number in [0, {}]", n), fmt::format("{}", loads[i].segment));
+    for (std::size_t i = 0; i < loads.size(); ++i)
+      require(loads[i].segment <= arm_.size(), fmt::format("plant.loads[{}].segment", i),
+              fmt::format("a whole number in [0, {}]", arm_.size()), loads[i].segment);
+  }
+
+  void check_slips_of_the_arm() const {
+    const Eigen::Vector3d& g = arm_.gravity_mps2;
+    require(g.z() <= 0.0 && g.norm() <= kMostGravity_mps2, "arm.gravity_mps2",
+            fmt::format("a vector that does not point up (z of the world is up), at most {} m/s^2",
+                        kMostGravity_mps2),
+            fmt::format("[{}, {}, {}] m/s^2", g.x(), g.y(), g.z()));
+    if (actuation_.kind == ActuationKind::torque) return;
+    for (std::size_t i = 0; i < arm_.segments.size(); ++i) {
+      const double bend_rad = full_bend_rad(experiment_, i);
+      require(bend_rad <= kMostBend_rad, "actuation.chambers",
+              fmt::format("chambers that bend a segment by at most {} rad at max_pressure_bar "
+                          "(gain in N m/bar, stiffness in N m/rad)",
+                          kMostBend_rad),
+              fmt::format("{:.4g} rad in segment {}", bend_rad, i + 1));
     }
+  }
+
+  /// Millimetres taken for metres.
+  void check_marker_frames() const {
+    const double most_m = std::max(1.0, arm_.length_m());
+    for_marker_frames([&](const std::string& key, const MarkerFrameSettings& frame) {
+      require(frame.position_m.norm() <= most_m, key + ".position_m",
+              fmt::format("a marker frame at most {:.4g} m beside its body", most_m),
+              frame.position_m.norm());
+    });
+  }
+
+  /// A rate at which frames or the ramp cannot do their work.
+  void check_tick() const {
+    const double tick_s = 1.0 / experiment_.rate_hz;
+    const double wait_s = safety_.max_latency_s - safety_.frame_latency_s;
+    require(tick_s <= wait_s + 1e-9, "daemon.rate_hz",
+            fmt::format("at least {:.6g} Hz: frames wait up to a tick and are then older than "
+                        "daemon.safety.max_latency_s, so good_frames in a row never come",
+                        wait_s > 0.0 ? 1.0 / wait_s : INFINITY),
+            experiment_.rate_hz);
+    require(tick_s <= kFramesATick * safety_.frame_period_s, "daemon.rate_hz",
+            fmt::format("at least {:.6g} Hz: a tick takes {} frames, more of them would be lost",
+                        1.0 / (kFramesATick * safety_.frame_period_s), kFramesATick),
+            experiment_.rate_hz);
+    const double ramp_ticks =
+        std::ceil(actuation_.max_pressure_bar / (actuation_.vent_bar_per_s * tick_s) - 1e-9);
+    require((ramp_ticks + kTicksOfAStop) * tick_s < kLongestStop_s, "daemon.rate_hz",
+            fmt::format("a rate at which a stop takes less than {} s ({:.0f} ticks of the vent "
+                        "ramp, {} around it)",
+                        kLongestStop_s, ramp_ticks, kTicksOfAStop),
+            experiment_.rate_hz);
+    require(safety_.vent_overruns * tick_s <= kLongestStop_s, "daemon.safety.vent_overruns",
+            fmt::format("at most {} s of ticks", kLongestStop_s),
+            fmt::format("{:.4g} s", safety_.vent_overruns * tick_s));
+  }
+
+  void check_times() const {
+    const SafetyThresholds resolved = resolve_thresholds(safety_, 1.0 / experiment_.rate_hz);
+    const auto at_most = [&](const char* key, double value_s, double bound_s) {
+      require(value_s <= bound_s, fmt::format("daemon.safety.{}", key),
+              fmt::format("a time of at most {} s where real valves are driven, given or derived",
+                          bound_s),
+              value_s);
+    };
+    at_most("hold_after_s", to_seconds(resolved.hold_after_ns), kLongestHold_s);
+    at_most("vent_after_s", to_seconds(resolved.vent_after_ns), kLongestVentDelay_s);
+    at_most("deadman_timeout_s", safety_.deadman_timeout_s, kLongestVentDelay_s);
+    if (safety_.valve_readback)
+      at_most("valve_silence_s", safety_.valve_silence_s, kLongestVentDelay_s);
   }
 
   const Experiment& experiment_;
   const ConfigKeys& keys_;
+  const ArmParameters& arm_ = experiment_.arm;
+  const ActuationSettings& actuation_ = experiment_.actuation;
+  const EstimationSettings& estimation_ = experiment_.estimation;
+  const ControllerSettings& control_ = experiment_.control;
+  const SafetySettings& safety_ = experiment_.safety;
+  const TransportSettings& transport_ = experiment_.transport;
 };
 
 }  // namespace
 
+bool drives_real_valves(const Experiment& experiment) {
+  const ValveDriverSettings& valves = experiment.valves;
+  return experiment.actuation.kind == ActuationKind::chambers &&
+         (valves.backend != "modbus" || !valves.host.starts_with("127."));
+}
+
+double full_bend_rad(const Experiment& experiment, std::size_t segment) {
+  double gain = 0.0;
+  for (const Chamber& chamber : experiment.actuation.segments[segment])
+    gain = std::max(gain, chamber.gain_nm_per_bar);
+  return gain * experiment.actuation.max_pressure_bar /
+         experiment.arm.segments[segment].stiffness_nm_per_rad;
+}
+
 void check_consistency(const Experiment& experiment, const ConfigKeys& keys) {
   Checks(experiment, keys).run();
-  check_plausibility(experiment, keys);
 }
 
 }  // namespace softarm

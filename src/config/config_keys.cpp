@@ -307,6 +307,15 @@ void ConfigKeys::when(bool condition, const Body& body) {
   }
 }
 
+void ConfigKeys::refuse(const char* key, const char* why) {
+  if (!reading()) return;
+  Frame& frame = frames_.back();
+  frame.known.insert(key);
+  if (const YamlNode* node = frame.node->find(key))
+    report({*node->key_location.file, node->key_location.line, frame.path_of(key),
+            fmt::format("nothing: {}", why), node->describe()});
+}
+
 void ConfigKeys::either(const char* exact, const Body& exact_body, const char* friendly,
                         const Body& friendly_body) {
   bool as_exact = purpose_ == Purpose::print;

@@ -124,10 +124,9 @@ static void describe(Keys& key, ModelObserverSettings& it) {
   KEY(payload_deviation, from(0, 10),
       "standard deviation of a mass at the tip before anything was learnt, over the arm's mass: "
       "stiffness, damping and gain of all segments are then likely to be wrong together");
-  it.load.resize(static_cast<std::size_t>(2 * key.segments), 0.0);
-  KEY(load, from(-1, 1).one_or_pairs(),
-      "horizontal load of every segment before anything was learnt, over its weight: [x, y] across "
-      "gravity; --learned writes it");
+  LIST(load, 2 * key.segments, from(-1, 1).one_or_pairs(),
+       "horizontal load of every segment before anything was learnt, over its weight: [x, y] "
+       "across gravity; --learned writes it");
   KEY(load_deviation, from(0, 1), "its standard deviation; left out: parameter_deviation");
   KEY(parameter_drift_per_sqrt_s, from(0, 1), "random walk of the parameters, relative");
   KEY(disturbance_drift_per_sqrt_s, above(0, 10),
@@ -139,8 +138,7 @@ static void describe(Keys& key, ModelObserverSettings& it) {
 static void describe(Keys& key, EstimationSettings& it) {
   KEY(method, one_of({"pose", "orientation", "paper_eq20"}),
       "pose: position and orientation; orientation: inertial sensors; paper_eq20: the paper's "
-      "(20), "
-      "for comparison only");
+      "(20), for comparison only");
   KEY(position_noise_m, above(0, 0.02), "standard deviation an axis of every measured body");
   KEY(orientation_noise_rad, above(0, 0.2), "the same, of its rotation vector");
   KEY(filter_bandwidth_radps, above(0, 1e5), "of the velocity filter on u");
@@ -178,31 +176,18 @@ static void describe(Keys& key, TaskSpaceSettings& it) {
       "of learning how that difference depends on the place; 0: not learnt");
 }
 
-static void describe_law(Keys& key, LawKind& chosen) {
-  const auto names = control_laws().names();
-  std::size_t index = control_laws().index(chosen.name());
-  key("law", index, one_of(names),
-      "curvature: (17); statics_pi: G and K u_ref with PI; external: another process answers "
-      "law_state_t with law_command_t");
-  if (key.reading()) chosen = control_laws().all()[index];
-  for (LawKind kind : control_laws().all()) {
-    if (!kind.has_keys()) continue;
-    const bool it_is = std::string_view(kind.name()) == chosen.name();
-    key.section({kind.name(), "for the law of this name"},
-                [&] { (it_is ? chosen : kind).describe(key); });
-  }
-}
-
 static void describe(Keys& key, RepetitionSettings& it) {
   KEY(lead_s, from(0, 1),
       "what repeats is known so long before the observer has seen it: what it is late by, about "
-      "0.1 "
-      "s; 0: nothing is learnt, at no cost");
+      "0.1 s; 0: nothing is learnt, at no cost");
   KEY(period_s, above(0, 1e4), "left out: that of the reference");
 }
 
 static void describe(Keys& key, ControllerSettings& it) {
-  describe_law(key, it.law);
+  describe_kind(key, "law", control_laws(), it.law,
+                "curvature: (17); statics_pi: G and K u_ref with PI; external: another process "
+                "answers law_state_t with law_command_t",
+                "for the law of this name");
   const bool has_gains =
       it.law.get_if<CurvatureLaw>() != nullptr || it.law.get_if<StaticsPiLaw>() != nullptr;
   const Presence presence = has_gains ? kRequired : Presence::optional;
@@ -227,8 +212,7 @@ static void describe(Keys& key, ControllerSettings& it) {
       "the arm stays soft), none");
   KEY(repetition,
       "of the disturbance along a periodic reference, learnt by its phase and cancelled ahead; "
-      "with "
-      "estimation.observer: model and disturbance: cancel");
+      "with estimation.observer: model and disturbance: cancel");
   KEY(valve_lag_s, from(0, 2), "first-order lag inverted on what depends on the reference alone");
   key("delay_s", it.dead_time_s, from(0, 0.5),
       "dead time of valves and tubes, for the check of gains at load time");
@@ -246,13 +230,11 @@ static void describe(Keys& key, RunSettings& it) {
   KEY(log_rate_hz, from(0, 1e4), "rows of log.csv, from which errors are taken; 0: every tick");
 }
 
-static void describe_inverse(Keys& key, ActuatorInverseSettings& it, std::size_t chambers) {
-  it.fill_lag_s.resize(chambers, 0.0);
-  it.vent_lag_s.resize(chambers, 0.0);
-  KEY(fill_lag_s, from(0, 100).one_or_each(),
-      "of every chamber, where its pressure rises; what the inverse leaves is control.valve_lag_s; "
-      "0: that");
-  KEY(vent_lag_s, from(0, 100).one_or_each(), "the same where it falls");
+static void describe(Keys& key, ActuatorInverseSettings& it) {
+  LIST(fill_lag_s, key.chambers, from(0, 100).one_or_each(),
+       "of every chamber, where its pressure rises; what the inverse leaves is "
+       "control.valve_lag_s; 0: that");
+  LIST(vent_lag_s, key.chambers, from(0, 100).one_or_each(), "the same where it falls");
   KEY(hysteresis, from(0, 0.9),
       "part of every pressure that acts on the arm through play operators");
   KEY(play_bar, from(0, 100).list(), "half widths of these operators, in equal shares");
@@ -266,50 +248,41 @@ static void describe_inverse(Keys& key, ActuatorInverseSettings& it, std::size_t
 }
 
 /// Terms that `softarm identify` writes for arms that lag, stretch and remember.
-static void describe_memory(Keys& key, IdentificationSettings& it, std::size_t chambers) {
-  const auto n = static_cast<std::size_t>(key.segments);
+static void describe_memory(Keys& key, IdentificationSettings& it) {
   KEY(load_kg, from(0, 100), "a point mass at the tip, likewise");
   KEY(inertia, "false: without it, for motion so slow that it does not count");
-  it.push_nm_per_bar.resize(2 * chambers, 0.0);
-  KEY(push_nm_per_bar, from(-1e4, 1e4).one_or_pairs(),
-      "of every chamber, generalized force in u, in any direction; 0: as actuation has it");
-  it.fill_lag_s.resize(chambers, 0.0);
-  it.vent_lag_s.resize(chambers, 0.0);
-  KEY(fill_lag_s, from(0, 100).one_or_each(),
-      "of every chamber, where its pressure rises; 0: lag_s");
-  KEY(vent_lag_s, from(0, 100).one_or_each(), "the same where it falls");
-  it.saturation_1pbar.resize(chambers, 0.0);
-  KEY(saturation_1pbar, from(-100, 100).one_or_each(),
-      "of every chamber, q: p counts as p (1 + q p)");
+  LIST(push_nm_per_bar, 2 * key.chambers, from(-1e4, 1e4).one_or_pairs(),
+       "of every chamber, generalized force in u, in any direction; 0: as actuation has it");
+  LIST(fill_lag_s, key.chambers, from(0, 100).one_or_each(),
+       "of every chamber, where its pressure rises; 0: lag_s");
+  LIST(vent_lag_s, key.chambers, from(0, 100).one_or_each(), "the same where it falls");
+  LIST(saturation_1pbar, key.chambers, from(-100, 100).one_or_each(),
+       "of every chamber, q: p counts as p (1 + q p)");
   KEY(stiffening_1pbar, from(-100, 100), "s: k counts as k (1 + s sum of the segment's pressures)");
   KEY(stiffening_by_length, from(-20, 20),
       "q: k counts as k (l / L)^q, with the l that pressures give by stretch_m_per_bar");
-  it.cross_nm_per_bar.resize(2 * n * chambers, 0.0);
-  KEY(cross_nm_per_bar, from(-1e4, 1e4).one_or_each(),
-      "of every chamber in turn, 2n numbers: force on all segments beside push_nm_per_bar");
+  LIST(cross_nm_per_bar, 2 * key.segments * key.chambers, from(-1e4, 1e4).one_or_each(),
+       "of every chamber in turn, 2n numbers: force on all segments beside push_nm_per_bar");
   KEY(slip_radius_rad, from(0, kTwoPi).list(), "hysteresis: bends at which springs slip");
   KEY(slip_stiffness_nm_per_rad, from(0, 1e4).list(), "of these springs");
   KEY(remanence, from(0, 1), "share of the bend by which the rest follows it");
   KEY(remanence_s, above(0, 1e4), "time constant of that");
   KEY(remanence_2, from(0, 1), "the same with another time, from 0 at first");
   KEY(remanence_2_s, above(0, 1e4), "that time");
-  it.remanent_u_rad.resize(2 * n, 0.0);
-  KEY(remanent_u_rad, from(-kTwoPi, kTwoPi).one_or_pairs(), "where the rest is at first, for that");
+  LIST(remanent_u_rad, 2 * key.segments, from(-kTwoPi, kTwoPi).one_or_pairs(),
+       "where the rest is at first, for that");
 }
 
-static void describe_stretch(Keys& key, IdentificationSettings& it, std::size_t chambers) {
-  const auto n = static_cast<std::size_t>(key.segments);
-  it.stretch_m_per_bar.resize(n * chambers, 0.0);
-  KEY(stretch_m_per_bar, from(-10, 10).one_or_each(),
-      "of every chamber in turn, n numbers: by what it lengthens the segments; all 0: not known");
-  it.stretch_length_m.resize(n, 0.0);
-  KEY(stretch_length_m, from(0, 1e3).one_or_each(), "of the segments without pressure, for that");
-  it.stretch_fill_s.resize(chambers, 0.0);
-  it.stretch_vent_s.resize(chambers, 0.0);
-  KEY(stretch_fill_s, from(0, 100).one_or_each(), "lag of every chamber's stretch as it rises");
-  KEY(stretch_vent_s, from(0, 100).one_or_each(), "and as it falls");
-  it.stretch_saturation_1pbar.resize(chambers, 0.0);
-  KEY(stretch_saturation_1pbar, from(-100, 100).one_or_each(), "as saturation_1pbar");
+static void describe_stretch(Keys& key, IdentificationSettings& it) {
+  LIST(stretch_m_per_bar, key.segments * key.chambers, from(-10, 10).one_or_each(),
+       "of every chamber in turn, n numbers: by what it lengthens the segments; all 0: not known");
+  LIST(stretch_length_m, key.segments, from(0, 1e3).one_or_each(),
+       "of the segments without pressure, for that");
+  LIST(stretch_fill_s, key.chambers, from(0, 100).one_or_each(),
+       "lag of every chamber's stretch as it rises");
+  LIST(stretch_vent_s, key.chambers, from(0, 100).one_or_each(), "and as it falls");
+  LIST(stretch_saturation_1pbar, key.chambers, from(-100, 100).one_or_each(),
+       "as saturation_1pbar");
   KEY(stretch_friction_m, from(0, 1), "half width of a play between pressure and length");
   KEY(stretch_remanence, from(0, 10), "as remanence");
   KEY(stretch_remanence_s, above(0, 1e4), "as remanence_s");
@@ -319,22 +292,20 @@ static void describe_stretch(Keys& key, IdentificationSettings& it, std::size_t 
   KEY(stretch_by_bend_m_per_rad2, from(-10, 10), "what a bend u adds to a length, by |u|^2");
 }
 
-static void describe_identification(Keys& key, IdentificationSettings& it, MotionLimits& limits,
-                                    std::size_t chambers) {
-  it.rest_u_rad.resize(static_cast<std::size_t>(2 * key.segments), 0.0);
+static void describe_identification(Keys& key, IdentificationSettings& it, MotionLimits& limits) {
   KEY(steps_bar, above(0, 100).list(), "pressures of the steps, on every side in turn");
   KEY(hold_s, from(0.1, 100), "from step to step");
   key("max_theta_rad", limits.max_theta_rad, above(0, kTwoPi),
       "a segment that bends farther ends the experiment");
   key("max_speed_radps", limits.max_speed_radps, above(0, 100),
       "a segment that moves faster ends the experiment");
-  KEY(rest_u_rad, from(-kTwoPi, kTwoPi).one_or_pairs(),
-      "where the springs rest, to predict a recorded motion; the controller does not know it");
+  LIST(rest_u_rad, 2 * key.segments, from(-kTwoPi, kTwoPi).one_or_pairs(),
+       "where the springs rest, to predict a recorded motion; the controller does not know it");
   KEY(cubic_nm_per_rad3, from(-1e4, 1e4), "likewise: adds c |u - rest|^2 (u - rest) to K u");
   KEY(lag_s, from(0, 100), "first order, from set point to pressure, likewise");
   key("delay_s", it.dead_time_s, from(-1, 100), "from set point to frame, likewise");
-  describe_memory(key, it, chambers);
-  describe_stretch(key, it, chambers);
+  describe_memory(key, it);
+  describe_stretch(key, it);
 }
 
 static void describe_uncertainty(Keys& key, Experiment& experiment) {
@@ -350,7 +321,7 @@ static void describe_uncertainty(Keys& key, Experiment& experiment) {
 
 void describe(Keys& key, Experiment& it) {
   KEY(name, from(1, 100), "of the experiment, for logs and plots", kRequired);
-  KEY(seed, from(0, 9007199254740992.0), "of every random number of the simulated arm");
+  KEY(seed, from(0, kLargestWhole), "of every random number of the simulated arm");
   key.section({"arm", "the arm as the controller models it", kRequired}, [&] {
     key.segments = std::max(1, it.arm.size());
     key("segments", key.segments, from(1, kMaxSegments), "how many", kRequired);
@@ -362,14 +333,11 @@ void describe(Keys& key, Experiment& it) {
   });
   key.section({"actuation", "chambers and the limits of their valves", kRequired}, [&] {
     describe_actuation(key, it.actuation, kRequired);
+    key.chambers = chamber_count(it.actuation);
     key.when(it.actuation.kind == ActuationKind::chambers, [&] {
-      key.section({"inverse",
-                   "what lies between set points and moments, inverted in the tick; "
-                   "all zero: nothing is, at no cost"},
-                  [&] {
-                    describe_inverse(key, it.actuator_inverse,
-                                     static_cast<std::size_t>(chamber_count(it.actuation)));
-                  });
+      key("inverse", it.actuator_inverse,
+          "what lies between set points and moments, inverted in the tick; all zero: nothing is, "
+          "at no cost");
     });
   });
   KEY(estimation, "from motion-capture frames to u");
@@ -378,17 +346,15 @@ void describe(Keys& key, Experiment& it) {
   key.section({"daemon", "rate, safety and connections of softarmd"},
               [&] { describe_daemon(key, it); });
   if (it.valves.order.empty()) {
-    it.valves.order.resize(static_cast<std::size_t>(chamber_count(it.actuation)));
+    it.valves.order.resize(static_cast<std::size_t>(key.chambers));
     std::iota(it.valves.order.begin(), it.valves.order.end(), 0);
   }
   KEY(valves, "the valve terminal that softarm-valves drives");
   key.section({"plant", "the simulated arm; left out: the arm as the controller models it"},
               [&] { describe_plant(key, it); });
   KEY(run, "defaults of a simulated run");
-  key.section({"identification", "the steps and the findings of `softarm identify`"}, [&] {
-    describe_identification(key, it.identification, it.motion_limits,
-                            static_cast<std::size_t>(chamber_count(it.actuation)));
-  });
+  key.section({"identification", "the steps and the findings of `softarm identify`"},
+              [&] { describe_identification(key, it.identification, it.motion_limits); });
 }
 
 }  // namespace softarm

@@ -10,32 +10,31 @@ static void describe_elongation(Keys& key, ReferencePhase& phase) {
       !phase.kind.is_tip_path() && phase.kind.get_if<LiveReference>() == nullptr;
   key.when(curvatures, [&] {
     ElongationPath& it = phase.elongation;
-    key.section({"elongation",
-                 "of every segment that stretches, mean + amplitude sin(rate t), as far as "
-                 "pressures can"},
-                [&] {
-                  KEY(mean_m, from(-1, 1), "left out: that of the bias pressures");
-                  KEY(amplitude_m, from(-1, 1), "of every segment");
-                  KEY(rate_radps, from(0, 100), "t = 0 where the phase begins");
-                });
+    key.section(
+        {"elongation",
+         "of every segment that stretches, mean + amplitude sin(rate t), as far as pressures can"},
+        [&] {
+          KEY(mean_m, from(-1, 1), "left out: that of the bias pressures");
+          KEY(amplitude_m, from(-1, 1), "of every segment");
+          KEY(rate_radps, from(0, 100), "t = 0 where the phase begins");
+        });
   });
 }
 
 void describe_reference(Keys& key, ReferenceSettings& it) {
-  const auto names = reference_kinds().names();
   const Key list = {"reference", "phases one after the other; time starts at ACTIVE", kRequired};
   key.list(list, it.phases, [&](ReferencePhase& phase) {
-    std::size_t kind = reference_kinds().index(phase.kind.name());
-    key("kind", kind, one_of(names),
-        "set_point: hold; paper: (24); way_points; live: what comes over LCM; live_tip: targets of "
-        "the tip over LCM, by (21); table: a CSV file; tip_...: a path of the tip by (21), "
-        "tip_lemniscate: (22)",
-        kRequired);
-    if (key.reading()) phase.kind = reference_kinds().all()[kind];
-    key.when(&phase != &it.phases.back(), [&] {
+    describe_choice(key, "kind", reference_kinds(), phase.kind,
+                    "set_point: hold; paper: (24); way_points; live: what comes over LCM; "
+                    "live_tip: targets of the tip over LCM, by (21); table: a CSV file; tip_...: a "
+                    "path of the tip by (21), tip_lemniscate: (22)",
+                    kRequired);
+    const bool last = &phase == &it.phases.back();
+    key.when(!last, [&] {
       key("duration_s", phase.duration_s, above(0, kMany),
           "of the phase; the last one has none and does not end", kRequired);
     });
+    if (last) key.refuse("duration_s", "the last phase does not end");
     phase.kind.describe(key);
     describe_elongation(key, phase);
   });
@@ -122,13 +121,11 @@ static void describe_mocap(Keys& key, TransportSettings& transport) {
   const std::vector<double> z_up = {1, 0, 0, 0, 1, 0, 0, 0, 1};
   const std::vector<double> y_up = {1, 0, 0, 0, 0, -1, 0, 1, 0};
   MocapSourceSettings& it = transport.mocap;
-  const auto names = mocap_sources().names();
-  std::size_t source = mocap_sources().index(it.source.name());
-  key("source", source, one_of(names),
+  describe_choice(
+      key, "source", mocap_sources(), it.source,
       "softarm: mocap_frame_t; optitrack: optitrack_frame_t; rigid_transform: rigid_transform_t "
       "(Vicon), one channel a body; natnet: OptiTrack Motive; qtm: Qualisys");
   if (key.reading()) {
-    it.source = mocap_sources().all()[source];
     it.quaternion = it.source.quaternion;
     it.unit = it.source.unit;
     transport.lcm.mocap_channel = it.source.channel;
@@ -168,8 +165,7 @@ static void describe_bodies(Keys& key, BodySettings& it, const MocapSourceKind& 
   KEY(base_id, id.or_word("fixed", -1), "body of the base, or fixed: arm.base holds");
   KEY(segment_ids, id.each(),
       "bodies of the segments' ends, base to tip (rigid_transform: names instead; qtm: the place "
-      "in "
-      "its list, from 1); left out: 1, 2, ...");
+      "in its list, from 1); left out: 1, 2, ...");
   key.section({"base_plate", "S_0 on the body of the base; softarm calibrate finds it"},
               [&] { describe_frame(key, it.base_marker_frame, source); });
   key.one_or_each({"segment_plates", "S_i on the segments' bodies, of all or a list; likewise"},
@@ -187,8 +183,7 @@ static void describe(Keys& key, RealtimeSettings& it) {
 constinit const std::array<ChannelKey, 15> kChannelKeys = {{
     {"mocap_channel", &LcmSettings::mocap_channel, 1,
      "frames; left out: OPTITRACK_FRAMES for optitrack; VICON for rigid_transform, where it is "
-     "what "
-     "the bodies' channels begin with"},
+     "what the bodies' channels begin with"},
     {"command_channel", &LcmSettings::command_channel, 1, "pressure commands"},
     {"measurement_channel", &LcmSettings::measurement_channel, 1, "measured pressures"},
     {"reference_channel", &LcmSettings::reference_channel, 1, "live references"},

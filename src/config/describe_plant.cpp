@@ -81,22 +81,6 @@ static void describe(Keys& key, BaseMotion& it) {
   KEY(phase_rad, from(-100, 100), "at t = 0");
 }
 
-/// The section of every kind, whichever is chosen.
-static void describe_kind(Keys& key, PlantKind& chosen) {
-  const auto names = plant_kinds().names();
-  std::size_t index = plant_kinds().index(chosen.name());
-  key("kind", index, one_of(names),
-      "pcc: the model; refined: several constant-curvature pieces a segment; links: rigid links, "
-      "the paper's section VI");
-  if (key.reading()) chosen = plant_kinds().all()[index];
-  for (PlantKind kind : plant_kinds().all()) {
-    if (!kind.has_keys()) continue;
-    const bool it_is = std::string_view(kind.name()) == chosen.name();
-    key.section({kind.name(), "for the kind of this name"},
-                [&] { (it_is ? chosen : kind).describe(key); });
-  }
-}
-
 /// What the world does to the arm.
 static void describe_world(Keys& key, PlantSettings& it) {
   KEY(tip_force_n, from(-1e4, 1e4), "constant external force at the tip, world frame");
@@ -104,8 +88,8 @@ static void describe_world(Keys& key, PlantSettings& it) {
     key.list({"loads", "external forces and moments on the segments' ends; none if left out"},
              it.loads, [&](ExternalLoad& load) { describe(key, load); });
   }
-  it.payload_kg.resize(it.arm.segments.size(), 0.0);
-  KEY(payload_kg, from(0, 100).one_or_each(), "masses on the segments' ends, of all or a list");
+  LIST(payload_kg, key.segments, from(0, 100).one_or_each(),
+       "masses on the segments' ends, of all or a list");
   KEY(base_motion, "the base moves along a sine, without turning");
 }
 
@@ -137,7 +121,10 @@ void describe_plant(Keys& key, Experiment& experiment) {
     it.valves.supply_pressure_bar = experiment.actuation.max_pressure_bar;
     it.seed = experiment.seed;
   }
-  describe_kind(key, it.kind);
+  describe_kind(key, "kind", plant_kinds(), it.kind,
+                "pcc: the model; refined: several constant-curvature pieces a segment; links: "
+                "rigid links, the paper's section VI",
+                "for the kind of this name");
   constexpr auto kOptional = Presence::optional;
   key.section({"mismatch", "factors on the controller's model", kOptional, SectionKind::input_only},
               [&] { describe_mismatch(key, it); });
@@ -148,11 +135,10 @@ void describe_plant(Keys& key, Experiment& experiment) {
               [&] { describe_actuation(key, it.actuation, kOptional); });
   KEY(valves, "between commanded and real pressure (or torque, then in N m)");
   KEY(material, "how the body differs from a linear spring and damper");
-  it.cross_nm_per_bar.resize(
-      2 * it.arm.segments.size() * static_cast<std::size_t>(chamber_count(it.actuation)), 0.0);
-  KEY(cross_nm_per_bar, from(-1e4, 1e4).one_or_each(),
-      "of every chamber in turn, 2n numbers: generalized force in u on all segments beside its "
-      "own");
+  LIST(cross_nm_per_bar, 2 * key.segments * chamber_count(it.actuation),
+       from(-1e4, 1e4).one_or_each(),
+       "of every chamber in turn, 2n numbers: generalized force in u on all segments beside its "
+       "own");
   KEY(mocap, "simulated motion capture");
   key.section({"initial", "where the arm starts, at rest"}, [&] {
     std::vector<double> u(it.initial_u_rad.begin(), it.initial_u_rad.end());

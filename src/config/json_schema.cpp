@@ -15,8 +15,7 @@ const std::string kFactor = R"(\+?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?)";
 
 /// 3 instead of 3.0.
 Json number(double value) {
-  constexpr double kExact = 9007199254740992.0;
-  if (value == std::round(value) && std::abs(value) <= kExact)
+  if (value == std::round(value) && std::abs(value) <= kLargestWhole)
     return static_cast<std::int64_t>(value);
   return value;
 }

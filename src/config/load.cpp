@@ -6,7 +6,6 @@
 
 #include "config/checks.hpp"
 #include "config/describe.hpp"
-#include "config/plausibility.hpp"
 #include "config/printers.hpp"
 #include "softarm/base/hash.hpp"
 #include "softarm/valves/register_map.hpp"
@@ -74,6 +73,14 @@ Experiment load_experiment(const std::filesystem::path& file) {
   } catch (const std::exception& error) {  // out of memory, a faulty file system
     throw ConfigError(file.string(), 0, "", "a file that can be read", error.what());
   }
+}
+
+Experiment write_experiment(OutputFile& file, const std::string& text) {
+  file.write(text);
+  file.flush();
+  Experiment written = load_experiment(file.partial());
+  file.commit();
+  return written;
 }
 
 std::string resolved_text(const Experiment& experiment) {

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "config/plausibility.hpp"
+#include "config/checks.hpp"
 #include "softarm/actuation/pressure_allocator.hpp"
 #include "softarm/base/time.hpp"
 #include "softarm/config/load.hpp"
@@ -36,20 +36,18 @@ std::vector<std::string> reaction_times(const Experiment& experiment) {
   line(FMT_STRING("  without a new command the valve side vents after {:.4g} s ({:.0f} ticks)"),
        safety.command_validity_s, safety.command_validity_s / tick_s);
   if (safety.valve_readback)
-    line(
-        FMT_STRING("  without a measured pressure: FAULT after {:.4g} s; one that does not follow: "
-                   "FAULT after at most {:.4g} s"),
-        safety.valve_silence_s, 2.0 * safety.pressure_settling_s);
+    line(FMT_STRING("  without a measured pressure: FAULT after {:.4g} s; one that does not "
+                    "follow: FAULT after at most {:.4g} s"),
+         safety.valve_silence_s, 2.0 * safety.pressure_settling_s);
   if (safety.deadman)
     line(FMT_STRING("  without a go of the dead-man input: VENT after {:.4g} s"),
          safety.deadman_timeout_s);
   if (experiment.control.law.get_if<ExternalLaw>() != nullptr)
-    line(
-        FMT_STRING("  without an answer of the law: HOLD at most {:.4g} s after the state that the "
-                   "newest answers, VENT {:.4g} s later"),
-        safety.law_validity_s, safety.law_vent_after_s);
-  line(FMT_STRING("  ticks missed in a row, under SCHED_FIFO: HOLD after {:.4g} s, VENT after "
-                  "{:.4g} s"),
+    line(FMT_STRING("  without an answer of the law: HOLD at most {:.4g} s after the state that "
+                    "the newest answers, VENT {:.4g} s later"),
+         safety.law_validity_s, safety.law_vent_after_s);
+  line(FMT_STRING(
+           "  ticks missed in a row, under SCHED_FIFO: HOLD after {:.4g} s, VENT after {:.4g} s"),
        safety.hold_overruns * tick_s, safety.vent_overruns * tick_s);
   if (drives_real_valves(experiment))
     line(FMT_STRING("  without a write the terminal vents by itself after {:.4g} s; arming is {}"),

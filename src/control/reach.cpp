@@ -13,19 +13,13 @@ constexpr int kSteps = 60;
 constexpr double kLongestStep_rad = 0.5;
 constexpr double kGoodEnough = 1e-4;  ///< of the arm's length
 
-double length_m(const ArmParameters& arm) {
-  double sum = 0.0;
-  for (const SegmentParameters& segment : arm.segments) sum += segment.length_m;
-  return sum;
-}
-
 }  // namespace
 
 TipSearch::TipSearch(const ArmParameters& arm, double max_theta_rad,
                      std::optional<double> plane_rad, const SegmentScalars& most_elongation_m)
     : arm_(arm),
       max_theta_rad_(max_theta_rad),
-      length_m_(length_m(arm)),
+      length_m_(arm.length_m()),
       plane_rad_(plane_rad),
       most_elongation_m_(most_elongation_m),
       best_(SegmentVector::Zero(arm.dof())),

@@ -33,12 +33,6 @@ void require_not_negative(const char* name, double value) {
   }
 }
 
-double length(const ArmParameters& arm) {
-  double sum_m = 0.0;
-  for (const SegmentParameters& segment : arm.segments) sum_m += segment.length_m;
-  return sum_m;
-}
-
 }  // namespace
 
 TaskSpaceTracker::TaskSpaceTracker(const ArmParameters& arm, const ControllerSettings& control,
@@ -51,7 +45,7 @@ TaskSpaceTracker::TaskSpaceTracker(const ArmParameters& arm, const ControllerSet
       blend_s_(control.blend_s),
       max_theta_rad_(kThetaBound * control.max_theta_rad),
       max_speed_radps_(control.max_speed_radps),
-      reach_m_(length(arm)),
+      reach_m_(arm.length_m()),
       offset_(gains_.tip_bandwidth_radps, gains_.map_rate_1ps, reach_m_),
       hard_mprad_(kHard * reach_m_) {
   require_positive("lambda_1ps", gains_.lambda_1ps);

@@ -2,13 +2,17 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
 #include <iterator>
+#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "softarm/base/version.hpp"
 
 namespace softarm {
 namespace {
+
+constexpr double kNothing = std::numeric_limits<double>::quiet_NaN();  ///< an empty cell
 
 /// Makes the folder if it can; who opens a file in it reports why not.
 const std::filesystem::path& made(const std::filesystem::path& folder) {
@@ -73,9 +77,11 @@ void ExperimentLog::cell(double value) {
   if (std::isfinite(value)) fmt::format_to(std::back_inserter(line_), "{:.9g}", value);
 }
 
-void ExperimentLog::cells(const double* values, int count, int expected) {
-  for (int k = 0; k < expected; ++k)
-    cell(k < count ? values[k] : std::numeric_limits<double>::quiet_NaN());
+/// Some of a vector's; empty where it has them not.
+template <class Values>
+void ExperimentLog::cells(const Values& values, Eigen::Index first, Eigen::Index count) {
+  const bool there = values.size() >= first + count;
+  for (Eigen::Index k = first; k < first + count; ++k) cell(there ? values[k] : kNothing);
 }
 
 void ExperimentLog::add(const LogRow& row) {
@@ -83,29 +89,23 @@ void ExperimentLog::add(const LogRow& row) {
   fmt::format_to(std::back_inserter(line_), "{:.9g},{},{},{}", row.t_s, name(row.mode),
                  name(row.reason), row.saturated ? 1 : 0);
   cell(row.frame_age_s);
-  const auto pair = [this](const SegmentVector& v, int i) {
-    cells(v.data() + 2 * i, v.size() >= 2 * i + 2 ? 2 : 0, 2);
-  };
-  const auto single = [this](const SegmentVector& v, int i) {
-    cells(v.data() + i, v.size() > i ? 1 : 0, 1);
-  };
   for (int i = 0; i < segments_; ++i) {
     for (const SegmentVector* v :
          {&row.u, &row.velocity, &row.reference, &row.truth, &row.tau_actuation})
-      pair(*v, i);
-    single(row.residual_torsion, i);
-    single(row.residual_length, i);
+      cells(*v, 2 * i, 2);
+    cells(row.residual_torsion, i, 1);
+    cells(row.residual_length, i, 1);
     if (!stretches_) continue;
     for (const SegmentScalars* v :
          {&row.elongation, &row.elongation_reference, &row.elongation_truth, &row.axial_force})
-      cells(v->data() + i, v->size() > i ? 1 : 0, 1);
+      cells(*v, i, 1);
   }
   for (int j = 0; j < chambers_; ++j) {
-    cells(row.commanded.data() + j, row.commanded.size() > j ? 1 : 0, 1);
-    cells(row.real.data() + j, row.real.size() > j ? 1 : 0, 1);
+    cells(row.commanded, j, 1);
+    cells(row.real, j, 1);
   }
-  cells(row.tip ? row.tip->data() : nullptr, row.tip ? 3 : 0, 3);
-  cells(row.tip_reference ? row.tip_reference->data() : nullptr, row.tip_reference ? 3 : 0, 3);
+  for (const auto* tip : {&row.tip, &row.tip_reference})
+    cells(tip->value_or(Eigen::Vector3d::Constant(kNothing)), 0, 3);
   line_ += '\n';
   file_.write(line_);
 }

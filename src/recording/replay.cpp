@@ -18,11 +18,7 @@ Replay::Replay(const Experiment& experiment, std::string build, bool any_configu
     : experiment_(experiment),
       build_(std::move(build)),
       any_configuration_(any_configuration),
-      by_torque_(experiment.actuation.kind == ActuationKind::torque),
-      records_(std::make_unique<Window<WaitingRecord>>()),
-      pressures_(std::make_unique<Window<WaitingPressures>>()),
-      torques_(std::make_unique<Window<WaitingTorques>>()),
-      statuses_(std::make_unique<Window<WaitingStatus>>()) {}
+      by_torque_(experiment.actuation.kind == ActuationKind::torque) {}
 
 void Replay::take(const LogEvent& event) {
   const LcmSettings& lcm = experiment_.transport.lcm;
@@ -31,27 +27,27 @@ void Replay::take(const LogEvent& event) {
   if (event.channel == lcm.tick_channel) {
     take_record(event);
   } else if (event.channel == lcm.status_channel) {
-    keep(event, *statuses_, incoming_status_, tick);
+    keep(event, statuses_, tick);
   } else if (event.channel == lcm.command_channel) {
-    by_torque_ ? keep(event, *torques_, incoming_torques_, sequence)
-               : keep(event, *pressures_, incoming_pressures_, sequence);
+    by_torque_ ? keep(event, torques_, sequence) : keep(event, pressures_, sequence);
   }
 }
 
 /// Commands and statuses wait for the record of their tick, which is sent after them.
-template <class Kind, class Tick>
-void Replay::keep(const LogEvent& event, Window<Kind>& window, Kind& incoming, Tick tick_of) {
+template <class Message, class Tick>
+void Replay::keep(const LogEvent& event, Window<Message>& window, Tick tick_of) {
+  Waiting<Message>& incoming = window.incoming;
   if (!decode(event.data, incoming.message)) {
     ++summary_.malformed;
     return;
   }
   incoming.tick = tick_of(incoming.message);
   incoming.position = event.position;
-  if (incoming.tick > 0) std::swap(place(window, incoming.tick), incoming);
+  if (incoming.tick > 0) std::swap(window.at(incoming.tick), incoming);
 }
 
 void Replay::take_record(const LogEvent& event) {
-  WaitingRecord& incoming = incoming_record_;
+  WaitingRecord& incoming = records_.incoming;
   const tick_record_t& record = incoming.message;
   if (!decode(event.data, incoming.message) || !is_intact(event.data) || !fits(record)) {
     ++summary_.malformed;
@@ -71,7 +67,7 @@ void Replay::take_record(const LogEvent& event) {
     next_ = record.tick;
   }
   newest_ = std::max(newest_, record.tick);
-  std::swap(place(*records_, record.tick), incoming);
+  std::swap(records_.at(record.tick), incoming);
   advance(kPatience);
 }
 
@@ -102,13 +98,13 @@ void Replay::begin_run(const tick_record_t& first) {
         hash_text(recorded), hash_text(experiment_.hash)));
   // Discards messages that wait from an earlier run: the clock shows that they precede this run.
   const auto forget = [&first](auto& window) {
-    for (auto& each : window)
+    for (auto& each : *window.places)
       if (each.message.time_us < first.first_ns / 1000) each.tick = 0;
   };
-  forget(*pressures_);
-  forget(*torques_);
-  forget(*statuses_);
-  for (auto& each : *records_) each.tick = 0;
+  forget(pressures_);
+  forget(torques_);
+  forget(statuses_);
+  for (auto& each : *records_.places) each.tick = 0;
   pipeline_ = std::make_unique<ControlPipeline>(experiment_);
   messages_ = std::make_unique<OutputMessages>(experiment_, Provenance{}, first.shadow != 0);
   running_ = exact_ = true;
@@ -131,7 +127,7 @@ void Replay::finish() { end_run(); }
 /// newest is missing.
 void Replay::advance(std::int64_t patience) {
   while (next_ <= newest_) {
-    WaitingRecord& waiting = place(*records_, next_);
+    WaitingRecord& waiting = records_.at(next_);
     if (waiting.tick == next_) {
       run(waiting);
       waiting.tick = 0;
@@ -140,8 +136,8 @@ void Replay::advance(std::int64_t patience) {
     }
     if (newest_ - next_ <= patience) return;
     const std::int64_t first = next_;
-    while (place(*records_, next_).tick != next_) ++next_;
-    add_gap(first, next_ - 1, place(*records_, next_));
+    while (records_.at(next_).tick != next_) ++next_;
+    add_gap(first, next_ - 1, records_.at(next_));
   }
 }
 
@@ -184,17 +180,17 @@ void Replay::compare(const WaitingRecord& record) {
   messages_->set_command(record.tick, output);
   messages_->set_status(record.tick, *pipeline_);
   if (by_torque_) {
-    compare_waiting(*torques_, record, messages_->torque_command, "command", summary_.commands);
+    compare_waiting(torques_, record, messages_->torque_command, "command", summary_.commands);
   } else {
-    compare_waiting(*pressures_, record, messages_->pressure_command, "command", summary_.commands);
+    compare_waiting(pressures_, record, messages_->pressure_command, "command", summary_.commands);
   }
-  compare_waiting(*statuses_, record, messages_->status, "status", summary_.statuses);
+  compare_waiting(statuses_, record, messages_->status, "status", summary_.statuses);
 }
 
-template <class Kind, class Message>
-void Replay::compare_waiting(Window<Kind>& window, const WaitingRecord& record, Message& replayed,
-                             const char* name, ReplayCount& count) {
-  Kind& waiting = place(window, record.tick);
+template <class Message>
+void Replay::compare_waiting(Window<Message>& window, const WaitingRecord& record,
+                             Message& replayed, const char* name, ReplayCount& count) {
+  Waiting<Message>& waiting = window.at(record.tick);
   if (waiting.tick != record.tick) return;
   waiting.tick = 0;
   replayed.time_us = waiting.message.time_us;  // read from the clock when it was sent

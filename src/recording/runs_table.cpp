@@ -33,12 +33,13 @@ std::string command(const Json& summary) {
   return value == "-" ? value : value + (torques ? " N m" : " bar");
 }
 
-Line line(const Path& folder, const Path& file) {
+Line line(const Path& folder, const Path& file, Files& unreadable) {
   Line out;
   out[0] = file.parent_path().lexically_relative(folder).string();
   const Json summary = Json::parse(std::ifstream(file), nullptr, false);
   if (!summary.is_object()) {
     out[1] = "unreadable summary.json";
+    unreadable.push_back(file);
     return out;
   }
   const Json& transitions = summary.value("transitions", Json::array());
@@ -56,7 +57,7 @@ Line line(const Path& folder, const Path& file) {
 
 }  // namespace
 
-std::string runs_table(const Path& folder) {
+RunsTable runs_table(const Path& folder) {
   std::vector<Path> files;
   for (const auto& entry : std::filesystem::recursive_directory_iterator(folder)) {
     if (entry.path().filename() == "summary.json") files.push_back(entry.path());
@@ -68,19 +69,19 @@ std::string runs_table(const Path& folder) {
   std::sort(files.begin(), files.end());
   std::vector<Line> lines(1);
   std::copy(kHead.begin(), kHead.end(), lines[0].begin());
-  for (const Path& file : files) lines.push_back(line(folder, file));
+  RunsTable table;
+  for (const Path& file : files) lines.push_back(line(folder, file, table.unreadable));
 
-  std::string text;
   for (const Line& each : lines) {
     for (std::size_t k = 0; k < each.size(); ++k) {
       std::size_t width = 0;
       for (const Line& other : lines) width = std::max(width, other[k].size());
-      text +=
+      table.text +=
           k == 0 ? fmt::format("{:<{}}", each[k], width) : fmt::format("  {:>{}}", each[k], width);
     }
-    text += '\n';
+    table.text += '\n';
   }
-  return text;
+  return table;
 }
 
 }  // namespace softarm

@@ -32,14 +32,15 @@ void TruthTrack::fill(std::int64_t time_us, LogRow& row) const {
   // Cubic Hermite interpolation of the states and velocities at both ends: the error is at most
   // h^4/384 times the fourth derivative.
   const double h = 1e-6 * span;
-  row.truth = (1 + 2 * s) * (1 - s) * (1 - s) * before_->u_rad +
-              h * s * (1 - s) * (1 - s) * before_->velocity_radps +
-              s * s * (3 - 2 * s) * after_->u_rad + h * s * s * (s - 1) * after_->velocity_radps;
+  const auto between = [&](auto PlantState::*value, auto PlantState::*rate) {
+    return ((1 + 2 * s) * (1 - s) * (1 - s) * *before_.*value +
+            h * s * (1 - s) * (1 - s) * *before_.*rate + s * s * (3 - 2 * s) * *after_.*value +
+            h * s * s * (s - 1) * *after_.*rate)
+        .eval();
+  };
+  row.truth = between(&PlantState::u_rad, &PlantState::velocity_radps);
   if (before_->elongation_m.size() == after_->elongation_m.size())
-    row.elongation_truth = (1 + 2 * s) * (1 - s) * (1 - s) * before_->elongation_m +
-                           h * s * (1 - s) * (1 - s) * before_->elongation_rate_mps +
-                           s * s * (3 - 2 * s) * after_->elongation_m +
-                           h * s * s * (s - 1) * after_->elongation_rate_mps;
+    row.elongation_truth = between(&PlantState::elongation_m, &PlantState::elongation_rate_mps);
   row.real = after_->pressure_bar;
   row.tip = (1 - s) * before_->tip_m + s * after_->tip_m;
 }

@@ -4,16 +4,16 @@
 
 namespace softarm {
 
-ArrivalClock::ArrivalClock(std::int64_t monotonic_ns, std::int64_t wall_ns) noexcept
-    : look_ns_(monotonic_ns), wall_minus_ns_(wall_ns - monotonic_ns) {
-  look(monotonic_ns, wall_ns);
+ArrivalClock::ArrivalClock(ClockPair now) noexcept
+    : look_ns_(now.monotonic_ns), wall_minus_ns_(now.wall_ns - now.monotonic_ns) {
+  look(now);
 }
 
-void ArrivalClock::look(std::int64_t monotonic_ns, std::int64_t wall_ns) noexcept {
+void ArrivalClock::look(ClockPair now) noexcept {
   look_before_ns_ = look_ns_;
   wall_minus_before_ns_ = wall_minus_ns_;
-  look_ns_ = monotonic_ns;
-  wall_minus_ns_ = wall_ns - monotonic_ns;
+  look_ns_ = now.monotonic_ns;
+  wall_minus_ns_ = now.wall_ns - now.monotonic_ns;
 }
 
 std::int64_t ArrivalClock::arrival_ns(std::int64_t stamp_us) noexcept {

@@ -1,5 +1,7 @@
 #include "softarm/transport/event_log.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <stdexcept>
@@ -108,9 +110,10 @@ void EventLogReader::add_damage(std::int64_t begin, std::int64_t end) {
 std::string EventLogReader::damage_text() const {
   if (damages_.empty()) return "";
   const LogDamage& first = damages_.front();
-  return "bytes " + std::to_string(first.begin) + " to " + std::to_string(first.end) +
-         " are damaged or cut, " + std::to_string(damage_count_) + " stretches and " +
-         std::to_string(damaged_bytes_) + " bytes in all; what precedes and follows them was used";
+  return fmt::format(
+      "bytes {} to {} are damaged or cut, {} stretches and {} bytes in all; what precedes and "
+      "follows them was used",
+      first.begin, first.end, damage_count_, damaged_bytes_);
 }
 
 bool EventLogReader::next(LogEvent& event) {
@@ -136,10 +139,10 @@ void EventLogWriter::write(std::int64_t time_us, std::string_view channel,
   if (channel.empty() || channel.size() > EventLogReader::kLargestChannel ||
       data.size() > EventLogReader::kLargestData)
     throw std::invalid_argument(
-        "an event of a log: expected a channel of 1 to " +
-        std::to_string(EventLogReader::kLargestChannel) + " bytes and data of up to " +
-        std::to_string(EventLogReader::kLargestData) + ", got " + std::to_string(channel.size()) +
-        " and " + std::to_string(data.size()));
+        fmt::format("an event of a log: expected a channel of 1 to {} bytes and data of up to {}, "
+                    "got {} and {}",
+                    EventLogReader::kLargestChannel, EventLogReader::kLargestData, channel.size(),
+                    data.size()));
   std::array<std::byte, kHeader> header;
   std::byte* to = std::copy(kSync.begin(), kSync.end(), header.data());
   put_number(static_cast<std::uint64_t>(number_++), 8, to);

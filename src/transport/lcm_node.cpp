@@ -23,6 +23,11 @@
 namespace softarm {
 namespace {
 
+constexpr const char* kNoRoute =
+    ". Without a multicast route give this machine one: ip link set lo up; ip route add "
+    "224.0.0.0/4 "
+    "dev lo";
+
 /// LCM interprets channel names as regular expressions; ours are literal.
 std::string quoted(const std::string& channel) {
   std::string pattern;
@@ -31,11 +36,6 @@ std::string quoted(const std::string& channel) {
     pattern += c;
   }
   return pattern;
-}
-
-ArrivalClock clock_from_now() noexcept {
-  const ClockPair now = read_clocks();
-  return {now.monotonic_ns, now.wall_ns};
 }
 
 /// LCM waits with select(), which aborts above FD_SETSIZE; where descriptors are lacking it reports
@@ -90,20 +90,11 @@ lcm_t* create(const std::string& url) {
 
 }  // namespace
 
-LcmNode::LcmNode(const std::string& url)
-    : lcm_(create(url)), arrivals_(clock_from_now()), buffer_(kLargestMessage) {
-  if (lcm_ == nullptr)
-    throw TransportError("LCM cannot start on \"" + url +
-                         "\". Without a multicast route give this machine one: "
-                         "ip link set lo up; ip route add 224.0.0.0/4 dev lo");
+LcmNode::LcmNode(const std::string& url) : lcm_(create(url)), buffer_(kLargestMessage) {
+  if (lcm_ == nullptr) throw TransportError("LCM cannot start on \"" + url + "\"" + kNoRoute);
 }
 
 LcmNode::~LcmNode() { lcm_destroy(lcm_); }
-
-void LcmNode::look_at_clocks() noexcept {
-  const ClockPair now = read_clocks();
-  arrivals_.look(now.monotonic_ns, now.wall_ns);
-}
 
 /// noexcept: no exception may unwind through LCM's C code, which would leave a lock held.
 void LcmNode::dispatch(const lcm_recv_buf_t* packet, const char* /*channel*/, void* user) noexcept {
@@ -122,9 +113,7 @@ void LcmNode::subscribe(const std::string& channel, int capacity, Handler handle
   lcm_subscription_t* subscription =
       lcm_subscribe(lcm_, quoted(channel).c_str(), dispatch, &stored);
   if (subscription == nullptr)
-    throw TransportError("LCM cannot subscribe to \"" + channel +
-                         "\". Without a multicast route give this machine one: "
-                         "ip link set lo up; ip route add 224.0.0.0/4 dev lo");
+    throw TransportError("LCM cannot subscribe to \"" + channel + "\"" + kNoRoute);
   lcm_subscription_set_queue_capacity(subscription, capacity);
   if (!first) return;
   const std::vector<bool> after = bound_udp_sockets();
@@ -141,7 +130,7 @@ std::int64_t LcmNode::dropped() const noexcept {
 }
 
 int LcmNode::drain(int limit) noexcept {
-  look_at_clocks();
+  arrivals_.look();
   int handled = 0;
   while (handled < limit && lcm_handle_timeout(lcm_, 0) > 0) ++handled;
   return handled;
@@ -152,7 +141,7 @@ bool LcmNode::wait_until(std::int64_t deadline_ns) noexcept {
   const timespec timeout = time_left(deadline_ns);
   pollfd descriptor{.fd = lcm_get_fileno(lcm_), .events = POLLIN, .revents = 0};
   if (ppoll(&descriptor, 1, &timeout, nullptr) <= 0) return false;
-  look_at_clocks();
+  arrivals_.look();
   return lcm_handle_timeout(lcm_, 0) > 0;
 }
 

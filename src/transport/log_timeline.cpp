@@ -1,11 +1,12 @@
 #include "softarm/transport/log_timeline.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
-#include <array>
-#include <cstdio>
 #include <cstdlib>
 
 #include "softarm/transport/mocap_source.hpp"
+#include "transport/byte_cursor.hpp"
 
 namespace softarm {
 namespace {
@@ -23,8 +24,6 @@ constexpr int kLongestHold = 64;
 
 // Bytes of the messages: 8 of the type's fingerprint, then its members.
 constexpr std::size_t kFirst = 8, kSecond = 16, kFourth = 32;
-
-std::int64_t magnitude(std::int64_t value) { return std::abs(value); }
 
 }  // namespace
 
@@ -54,11 +53,10 @@ std::optional<std::int64_t> LogTimeline::own_ns(const Source& source,
     if (!format_->decode(data, *sent_)) return std::nullopt;
     own = sent_->sender_time_us;
   } else {
-    if (data.size() < source.own_at + 8) return std::nullopt;
-    std::uint64_t bits = 0;
-    for (std::size_t k = 0; k < 8; ++k)
-      bits = bits << 8 | std::to_integer<unsigned>(data[source.own_at + k]);
-    own = static_cast<std::int64_t>(bits);
+    BigEndianCursor cursor(data);
+    cursor.skip(source.own_at);
+    own = cursor.take<std::int64_t>();
+    if (!cursor.ok()) return std::nullopt;
   }
   if (!is_time_us(source.own_unit_ns == 1 ? own / 1000 : own)) return std::nullopt;
   return own * source.own_unit_ns;
@@ -92,7 +90,7 @@ std::int64_t LogTimeline::place(Source& source, std::optional<std::int64_t> own_
   const std::int64_t advance_ns = dated ? *own_ns - *source.own_ns : 0;
   const bool clocked = source.runs && advance_ns > 0 && advance_ns < kLongest_ns;
   const std::int64_t own_line_ns = source.line_ns + advance_ns;
-  const bool agree = clocked && magnitude(guess_ns - own_line_ns) <=
+  const bool agree = clocked && std::abs(guess_ns - own_line_ns) <=
                                     (source.monotonic ? kAgree_ns : kMocapAgree_ns);
   undecided_ = false;
   if (!jumps) {
@@ -163,7 +161,7 @@ std::int64_t LogTimeline::restart(std::int64_t stamp_ns, std::int64_t position) 
 
 /// Whether several messages in a row agree by how much the stamps are off.
 bool LogTimeline::confirmed(std::int64_t error_ns) {
-  suspicions_ = magnitude(error_ns - suspected_ns_) <= kAgree_ns ? suspicions_ + 1 : 1;
+  suspicions_ = std::abs(error_ns - suspected_ns_) <= kAgree_ns ? suspicions_ + 1 : 1;
   suspected_ns_ = error_ns;
   return suspicions_ > kConfirmations;
 }
@@ -175,26 +173,25 @@ void LogTimeline::add(LogBreak::Kind kind, std::int64_t position, std::int64_t l
 
 std::string LogTimeline::text() const {
   std::string text;
+  const auto add = [&text](auto format, const auto&... values) {
+    text += (text.empty() ? "" : "; ") + fmt::format(format, values...);
+  };
   for (const LogBreak& each : breaks_) {
-    std::array<char, 256> line{};
-    const auto at = static_cast<long long>(each.position);
     if (each.kind == LogBreak::Kind::clock_set)
-      std::snprintf(line.data(), line.size(),
-                    "the logger's clock was set by %+.3f s at byte %lld (the messages' own times "
-                    "are used)",
-                    each.seconds, at);
+      add(FMT_STRING("the logger's clock was set by {:+.3f} s at byte {} (the messages' own times "
+                     "are used)"),
+          each.seconds, each.position);
     else if (each.kind == LogBreak::Kind::gap)
-      std::snprintf(line.data(), line.size(), "nothing was logged for %.1f s before byte %lld",
-                    each.seconds, at);
+      add(FMT_STRING("nothing was logged for {:.1f} s before byte {}"), each.seconds,
+          each.position);
     else
-      std::snprintf(line.data(), line.size(),
-                    "all clocks begin again at byte %lld: another recording was appended, or the "
-                    "clock was set; the time between is not known",
-                    at);
-    text += (text.empty() ? "" : "; ") + std::string(line.data());
+      add(FMT_STRING("all clocks begin again at byte {}: another recording was appended, or the "
+                     "clock was set; the time between is not known"),
+          each.position);
   }
   const auto more = count_ - static_cast<std::int64_t>(breaks_.size());
-  return more > 0 ? text + "; and " + std::to_string(more) + " more" : text;
+  if (more > 0) add(FMT_STRING("and {} more"), more);
+  return text;
 }
 
 }  // namespace softarm

@@ -7,7 +7,6 @@
 #include "softarm/transport/settings.hpp"
 
 namespace softarm {
-namespace {}  // namespace
 
 std::vector<std::string> mocap_channels(const TransportSettings& transport) {
   if (transport.mocap.source.network) return {};

@@ -43,8 +43,6 @@ class NatnetConnection final : public MocapConnection {
         connect_(natnet_request(NatnetMessage::connect)),
         keep_alive_(natnet_request(NatnetMessage::keep_alive)),
         ask_models_(natnet_request(NatnetMessage::request_models)) {
-    const ClockPair now = read_clocks();
-    arrivals_.emplace(now.monotonic_ns, now.wall_ns);
     if (network_.multicast.empty()) return;
     data_ = udp_socket(socket_address(network_.multicast, network_.data_port), true);
     join_multicast(data_, network_.multicast, network_.local_address);
@@ -61,7 +59,7 @@ class NatnetConnection final : public MocapConnection {
       if (received->bytes > buffer_.size()) return MocapNews::malformed;
       const MocapNews news = take({buffer_.data(), received->bytes}, frame);
       if (news == MocapNews::nothing) continue;
-      arrival_ns = std::min(now_ns, arrivals_->arrival_ns(received->stamp_us));
+      arrival_ns = std::min(now_ns, arrivals_.arrival_ns(received->stamp_us));
       if (news == MocapNews::frame) newest_ns_ = now_ns;
       return news;
     }
@@ -81,8 +79,7 @@ class NatnetConnection final : public MocapConnection {
   void begin(std::int64_t now_ns) noexcept {
     now_ns_ = now_ns;
     packets_ = 0;
-    const ClockPair clocks = read_clocks();
-    arrivals_->look(clocks.monotonic_ns, clocks.wall_ns);
+    arrivals_.look();
     if (newest_ns_ != kNever && now_ns - newest_ns_ > kSilent_ns) {
       newest_ns_ = kNever;
       known_ = models_known_ = false;
@@ -128,7 +125,7 @@ class NatnetConnection final : public MocapConnection {
   Socket data_;      ///< where frames come by multicast
   std::vector<std::byte> buffer_;
   std::vector<std::byte> connect_, keep_alive_, ask_models_;
-  std::optional<ArrivalClock> arrivals_;
+  ArrivalClock arrivals_;
   NatnetDialect dialect_;
   bool known_ = false, models_known_ = false;
   std::int64_t now_ns_ = kNever, asked_ns_ = kNever, newest_ns_ = kNever;
@@ -221,21 +218,16 @@ class NatnetFormat final : public MocapFormat {
 }  // namespace
 
 MocapSourceKind natnet_mocap() {
-  return {
-      .label = "natnet",
-      .make = []() -> std::unique_ptr<MocapFormat> { return std::make_unique<NatnetFormat>(); },
-      .channel = "NATNET",
-      .quaternion = QuaternionOrder::xyzw,
-      .network = MocapNetworkKind{
-          .connect = [](const TransportSettings& transport) -> std::unique_ptr<MocapConnection> {
-            return std::make_unique<NatnetConnection>(transport);
-          },
-          .serve = [](const TransportSettings& transport) -> std::unique_ptr<MocapServer> {
-            return std::make_unique<NatnetServer>(transport);
-          },
-          .port = 1510,
-          .version = "4.1",
-          .multicast = true}};
+  return {.label = "natnet",
+          .make = made<MocapFormat, NatnetFormat>,
+          .channel = "NATNET",
+          .quaternion = QuaternionOrder::xyzw,
+          .network = MocapNetworkKind{
+              .connect = made<MocapConnection, NatnetConnection, const TransportSettings&>,
+              .serve = made<MocapServer, NatnetServer, const TransportSettings&>,
+              .port = 1510,
+              .version = "4.1",
+              .multicast = true}};
 }
 
 }  // namespace softarm

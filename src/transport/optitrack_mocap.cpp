@@ -95,11 +95,10 @@ class OptitrackFormat final : public LcmMocapFormat<softarm_messages::optitrack_
 }  // namespace
 
 MocapSourceKind optitrack_mocap() {
-  return {
-      .label = "optitrack",
-      .make = []() -> std::unique_ptr<MocapFormat> { return std::make_unique<OptitrackFormat>(); },
-      .channel = "OPTITRACK_FRAMES",
-      .quaternion = QuaternionOrder::xyzw};
+  return {.label = "optitrack",
+          .make = made<MocapFormat, OptitrackFormat>,
+          .channel = "OPTITRACK_FRAMES",
+          .quaternion = QuaternionOrder::xyzw};
 }
 
 }  // namespace softarm

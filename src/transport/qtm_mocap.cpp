@@ -33,8 +33,6 @@ class QtmConnection final : public MocapConnection {
     encode_qtm_text(QtmMessage::command, "Version " + transport.mocap.network.version, version_);
     encode_qtm_text(QtmMessage::command, "GetParameters 6D", ask_names_);
     encode_qtm_text(QtmMessage::command, "StreamFrames AllFrames 6DRes", stream_);
-    const ClockPair now = read_clocks();
-    arrivals_.emplace(now.monotonic_ns, now.wall_ns);
   }
 
   MocapNews next(std::int64_t now_ns, SentFrame& frame,
@@ -70,8 +68,7 @@ class QtmConnection final : public MocapConnection {
   void begin(std::int64_t now_ns) noexcept {
     now_ns_ = now_ns;
     packets_ = 0;
-    const ClockPair clocks = read_clocks();
-    arrivals_->look(clocks.monotonic_ns, clocks.wall_ns);
+    arrivals_.look();
     const std::int64_t waited_ns = age_ns(now_ns, since_ns_);
     switch (step_) {
       case Step::pause:
@@ -132,7 +129,7 @@ class QtmConnection final : public MocapConnection {
         return std::nullopt;
       }
       end_ += received->bytes;
-      arrival_ns_ = arrivals_->arrival_ns(received->stamp_us);
+      arrival_ns_ = arrivals_.arrival_ns(received->stamp_us);
     }
   }
 
@@ -170,7 +167,7 @@ class QtmConnection final : public MocapConnection {
   std::vector<std::byte> buffer_;
   std::size_t begin_ = 0, end_ = 0;  ///< of what is in the buffer
   std::vector<std::byte> version_, ask_names_, stream_;
-  std::optional<ArrivalClock> arrivals_;
+  ArrivalClock arrivals_;
   Step step_ = Step::pause;
   std::int64_t since_ns_ = kNever;  ///< the beginning of the step, or the newest frame
   std::int64_t now_ns_ = kNever, arrival_ns_ = kNever;
@@ -276,20 +273,15 @@ class QtmFormat final : public MocapFormat {
 }  // namespace
 
 MocapSourceKind qtm_mocap() {
-  return {
-      .label = "qtm",
-      .make = []() -> std::unique_ptr<MocapFormat> { return std::make_unique<QtmFormat>(); },
-      .channel = "QTM",
-      .unit = LengthUnit::millimetre,
-      .network = MocapNetworkKind{
-          .connect = [](const TransportSettings& transport) -> std::unique_ptr<MocapConnection> {
-            return std::make_unique<QtmConnection>(transport);
-          },
-          .serve = [](const TransportSettings& transport) -> std::unique_ptr<MocapServer> {
-            return std::make_unique<QtmServer>(transport);
-          },
-          .port = 22223,
-          .version = "1.25"}};
+  return {.label = "qtm",
+          .make = made<MocapFormat, QtmFormat>,
+          .channel = "QTM",
+          .unit = LengthUnit::millimetre,
+          .network = MocapNetworkKind{
+              .connect = made<MocapConnection, QtmConnection, const TransportSettings&>,
+              .serve = made<MocapServer, QtmServer, const TransportSettings&>,
+              .port = 22223,
+              .version = "1.25"}};
 }
 
 }  // namespace softarm

@@ -1,9 +1,12 @@
 #include "transport/qtm_packets.hpp"
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <string>
+#include <utility>
 
 #include "transport/byte_cursor.hpp"
 #include "transport/byte_writer.hpp"
@@ -40,34 +43,22 @@ SentBody take_body(LittleEndianCursor& cursor, std::int32_t id) {
 }
 
 /// The five characters that XML writes as names.
+constexpr std::pair<std::string_view, char> kNames[] = {
+    {"&amp;", '&'}, {"&lt;", '<'}, {"&gt;", '>'}, {"&quot;", '"'}, {"&apos;", '\''}};
+
 void append_escaped(std::string& out, std::string_view text) {
   for (const char c : text) {
-    switch (c) {
-      case '&':
-        out += "&amp;";
-        break;
-      case '<':
-        out += "&lt;";
-        break;
-      case '>':
-        out += "&gt;";
-        break;
-      case '"':
-        out += "&quot;";
-        break;
-      case '\'':
-        out += "&apos;";
-        break;
-      default:
-        out += c;
-    }
+    const auto* const named =
+        std::ranges::find(kNames, c, &std::pair<std::string_view, char>::second);
+    if (named == std::end(kNames))
+      out += c;
+    else
+      out += named->first;
   }
 }
 
 /// Whether `escaped`, as XML writes it, is `name`.
 bool is_escaped(std::string_view escaped, std::string_view name) noexcept {
-  constexpr std::pair<std::string_view, char> kNames[] = {
-      {"&amp;", '&'}, {"&lt;", '<'}, {"&gt;", '>'}, {"&quot;", '"'}, {"&apos;", '\''}};
   for (const char c : name) {
     if (escaped.empty()) return false;
     std::size_t length = 1;

@@ -33,9 +33,7 @@ class RigidTransformFormat final : public LcmMocapFormat<softarm_messages::rigid
 
 MocapSourceKind rigid_transform_mocap() {
   return {.label = "rigid_transform",
-          .make = []() -> std::unique_ptr<MocapFormat> {
-            return std::make_unique<RigidTransformFormat>();
-          },
+          .make = made<MocapFormat, RigidTransformFormat>,
           .channel = "VICON",
           .channel_per_body = true};
 }

@@ -56,9 +56,7 @@ void to_message(const SentFrame& frame, mocap_frame_t& message) {
 }
 
 MocapSourceKind softarm_mocap() {
-  return {.label = "softarm", .make = []() -> std::unique_ptr<MocapFormat> {
-            return std::make_unique<SoftarmFormat>();
-          }};
+  return {.label = "softarm", .make = made<MocapFormat, SoftarmFormat>};
 }
 
 }  // namespace softarm

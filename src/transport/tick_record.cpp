@@ -15,11 +15,9 @@ using softarm_messages::law_command_t;
 using softarm_messages::tick_frame_t;
 using softarm_messages::tick_record_t;
 
-constexpr std::size_t kDigest = 8;  ///< at the end of every record
-
 void put_digest(std::span<std::byte> encoded) noexcept {
-  std::uint64_t digest = fnv1a(encoded.first(encoded.size() - kDigest));
-  for (std::size_t k = 1; k <= kDigest; ++k, digest >>= 8)
+  std::uint64_t digest = fnv1a(encoded.first(encoded.size() - kRecordDigest));
+  for (std::size_t k = 1; k <= kRecordDigest; ++k, digest >>= 8)
     encoded[encoded.size() - k] = static_cast<std::byte>(digest & 0xff);
 }
 
@@ -102,11 +100,11 @@ tick_record_t largest_record(const PipelineSettings& settings, const std::string
 }  // namespace
 
 bool is_intact(std::span<const std::byte> encoded) noexcept {
-  if (encoded.size() < kDigest) return false;
+  if (encoded.size() < kRecordDigest) return false;
   std::uint64_t digest = 0;
-  for (const std::byte each : encoded.last(kDigest))
+  for (const std::byte each : encoded.last(kRecordDigest))
     digest = digest << 8 | std::to_integer<std::uint64_t>(each);
-  return digest == fnv1a(encoded.first(encoded.size() - kDigest));
+  return digest == fnv1a(encoded.first(encoded.size() - kRecordDigest));
 }
 
 void to_record(const TickInput& input, tick_record_t& record) {

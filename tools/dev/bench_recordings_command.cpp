@@ -1,13 +1,12 @@
 // softarm-dev bench recordings: recordings of real arms, identified and predicted.
 #include <algorithm>
-#include <cstdio>
 #include <memory>
+#include <stdexcept>
 #include <string>
 #include <thread>
 
-#include "apps/program.hpp"
-#include "apps/progress.hpp"
 #include "dev/bench/recordings_bench.hpp"
+#include "dev/bench_report.hpp"
 #include "dev/commands.hpp"
 
 namespace softarm {
@@ -24,19 +23,13 @@ void measure(RecordingsOptions options) {
   options.arena.out = options.out;
   options.arena.config = shared_file("config", SOFTARM_CONFIG_FOLDER);
   options.arena.threads = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
-  std::string text;
-  ArenaReport report;
-  {
-    Progress progress(true);
-    report = run_arena(options.arena, [&](const std::string& what) { progress.update(what); });
-    text = options.json ? json(report) : table(report);
-  }
-  for (const std::string& message : report.skipped) say("softarm-dev: " + message + "\n");
-  if (report.rows.empty()) {
-    print_error("softarm-dev", options.data + ": expected a recording that is known, found none");
-    throw CLI::RuntimeError(kExitFailure);
-  }
-  std::fwrite(text.data(), 1, text.size(), stdout);
+  print_report(options.json, [&](auto progress) {
+    ArenaReport report = run_arena(options.arena, progress);
+    for (const std::string& message : report.skipped) say("softarm-dev: " + message + "\n");
+    if (report.rows.empty())
+      throw std::runtime_error(options.data + ": expected a recording that is known, found none");
+    return report;
+  });
 }
 
 }  // namespace

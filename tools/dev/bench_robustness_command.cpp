@@ -6,10 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "apps/program.hpp"
-#include "apps/progress.hpp"
 #include "dev/bench/robustness_draws.hpp"
 #include "dev/bench/robustness_scenes.hpp"
+#include "dev/bench_report.hpp"
 #include "dev/commands.hpp"
 #include "softarm/config/load.hpp"
 
@@ -25,24 +24,12 @@ struct RobustnessOptions {
   double from_s = -1.0;  ///< negative: as the scene has it
 };
 
-Experiment shipped_config(const std::string& name) {
-  return load_experiment(shared_file("config/" + name, SOFTARM_CONFIG_FOLDER "/" + name));
-}
+Experiment shipped(const std::string& name) { return load_experiment(shipped_config(name)); }
 
 /// The worst of every figure.
 void join(RobustnessTrial& worst, const RobustnessTrial& other) {
-  const auto larger = [](double& a, double b) {
-    if (!(b <= a)) a = b;
-  };
-  larger(worst.u_rms_rad, other.u_rms_rad);
-  larger(worst.u_largest_rad, other.u_largest_rad);
-  larger(worst.tip_rms_m, other.tip_rms_m);
-  larger(worst.e_rms_m, other.e_rms_m);
-  larger(worst.pressure_rate_bar_per_s, other.pressure_rate_bar_per_s);
-  larger(worst.tick_us, other.tick_us);
-  larger(worst.frame_tick_us, other.frame_tick_us);
-  larger(worst.nis, other.nis);
-  larger(worst.surprised, other.surprised);
+  for (const auto& [label, figure] : kRobustnessFigures)
+    if (!(other.*figure <= worst.*figure)) worst.*figure = other.*figure;
   worst.stayed_active &= other.stayed_active;
 }
 
@@ -50,7 +37,7 @@ void search(const RobustnessOptions& options) {
   const DrawLimits limits;
   Progress progress(true);
   const std::vector<Draw> draws =
-      run_draws(limits, options.first, options.draws, options.seed, shipped_config, [&](int done) {
+      run_draws(limits, options.first, options.draws, options.seed, shipped, [&](int done) {
         if (progress.due()) progress.update(fmt::format("{} of {}", done, options.draws));
       });
   const std::string text = options.json ? draws_json(limits, draws) : draws_table(limits, draws);
@@ -84,7 +71,7 @@ void measure_robustness(const RobustnessOptions& options) {
         if (!is_asked(options, law)) continue;
         progress.update(scene.name + ": " + name(law));
         const Experiment experiment =
-            robustness_experiment(scene, law, shipped_config, options.stretching);
+            robustness_experiment(scene, law, shipped, options.stretching);
         RobustnessTrial worst = trial(experiment, scene, 1);
         for (int seed = 2; seed <= options.seeds; ++seed)
           join(worst, trial(experiment, scene, seed));

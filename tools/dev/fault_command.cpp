@@ -180,18 +180,17 @@ CLI::Validator known_fault() {
       "FAULT"};
 }
 
-/// @throws CLI::RuntimeError with the exit code where the command line is not enough
-void run(const FaultOptions& options) {
-  if (options.list) return print_list();
-  if (options.config.empty() || options.fault.empty()) {
-    print_error("softarm-dev fault", "CONFIG and FAULT are required; see --help and --list");
-    throw CLI::RuntimeError(kExitUsage);
+int run(const FaultOptions& options) {
+  if (options.list) {
+    print_list();
+    return kExitOk;
   }
-  if (options.fault == "pause" && options.pid <= 1) {
-    print_error("softarm-dev fault", "pause needs --pid PID: pidof softarmd prints it");
-    throw CLI::RuntimeError(kExitUsage);
-  }
-  if (const int code = make(options); code != kExitOk) throw CLI::RuntimeError(code);
+  if (options.config.empty() || options.fault.empty())
+    return fail("softarm-dev fault", kExitUsage,
+                "CONFIG and FAULT are required; see --help and --list");
+  if (options.fault == "pause" && options.pid <= 1)
+    return fail("softarm-dev fault", kExitUsage, "pause needs --pid PID: pidof softarmd prints it");
+  return make(options);
 }
 
 }  // namespace
@@ -220,9 +219,9 @@ void add_fault_command(CLI::App& app) {
       ->check(CLI::Range(1L, 1'000'000'000L));
   command->add_option("--pid", options->pid, "of the process to pause")
       ->check(CLI::Range(1, std::numeric_limits<int>::max()));
-  command->callback([options, amount = amount] {
+  run_where_given(*command, [options, amount] {
     options->has_amount = amount->count() > 0;
-    run(*options);
+    return run(*options);
   });
 }
 

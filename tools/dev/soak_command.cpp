@@ -68,10 +68,8 @@ void add_soak_command(CLI::App& app) {
       "folder for what the processes print; left out: a temporary one, kept after a "
       "failure");
   command->add_flag("--json", options->as_json, "print the counters as JSON");
-  command->callback([options] {
-    if (const int code = soak(options->soak, options->out, options->as_json); code != kExitOk)
-      throw CLI::RuntimeError(code);
-  });
+  run_where_given(*command,
+                  [options] { return soak(options->soak, options->out, options->as_json); });
 }
 
 }  // namespace softarm

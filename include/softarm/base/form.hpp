@@ -10,6 +10,9 @@
 
 namespace softarm {
 
+/// A double holds every whole number up to here.
+inline constexpr double kLargestWhole = 0x1p53;
+
 /// The form of a value: words that represent numbers, or numbers in a range, alone or in lists.
 struct Form {
   /// A word that represents numbers.

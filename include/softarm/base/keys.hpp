@@ -53,7 +53,8 @@ class Keys {
 
   virtual ~Keys() = default;
 
-  int segments = 1;  ///< of the arm, for keys after `arm.segments`
+  // Of the arm, for keys after `arm.segments` and `actuation`.
+  int segments = 1, chambers = 0;
 
   /// Whether variables are being filled: then defaults may follow what was read before.
   virtual bool reading() const = 0;
@@ -106,6 +107,8 @@ class Keys {
   }
   /// Keys that are there under a condition only.
   virtual void when(bool condition, const Body& body) = 0;
+  /// A key that others like this section have. @param why  it must be left out here
+  virtual void refuse(const char* key, const char* why) = 0;
   /// Two ways to say the same.
   virtual void either(const char* exact, const Body& exact_body, const char* friendly,
                       const Body& friendly_body) = 0;

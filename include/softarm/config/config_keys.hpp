@@ -77,6 +77,7 @@ class ConfigKeys final : public Keys {
   std::filesystem::path beside(const char* key, const std::filesystem::path& path) const override;
   void section(const Key& key, const Body& body) override;
   void when(bool condition, const Body& body) override;
+  void refuse(const char* key, const char* why) override;
   void either(const char* exact, const Body& exact_body, const char* friendly,
               const Body& friendly_body) override;
 

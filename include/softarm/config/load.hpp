@@ -16,6 +16,9 @@ namespace softarm {
 /// @throws ConfigError, no other exception
 Experiment load_experiment(const std::filesystem::path& file);
 
+/// Writes an experiment, which replaces the file's only if it loads. @throws ConfigError, OutputError
+Experiment write_experiment(OutputFile& file, const std::string& text);
+
 /// The whole configuration as YAML, every default written out, units in comments. Loads again to
 /// the same experiment.
 std::string resolved_text(const Experiment& experiment);

@@ -64,6 +64,8 @@ struct ArmParameters {
   int size() const { return static_cast<int>(segments.size()); }
   int segment_dof() const { return extensible ? 3 : 2; }
   int dof() const { return segment_dof() * size(); }
+  /// Of all segments, at rest.
+  double length_m() const;
 };
 
 /// For what does not know segments that stretch. @throw std::invalid_argument for an arm that is

@@ -30,7 +30,8 @@ class ExperimentLog {
 
  private:
   void cell(double value);
-  void cells(const double* values, int count, int expected);
+  template <class Values>
+  void cells(const Values& values, Eigen::Index first, Eigen::Index count);
 
   OutputFile file_;
   int segments_;

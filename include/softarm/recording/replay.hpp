@@ -91,30 +91,25 @@ class Replay {
   /// A tick that has not come after so many later ones is missing: its repetition is overdue.
   static constexpr std::int64_t kPatience = TickRecorder::kRepeatAfter + 14;
 
-  struct Waiting {  ///< tick 0: an empty place
-    std::int64_t tick = 0, position = 0;
+  template <class Message>
+  struct Waiting {
+    std::int64_t tick = 0, position = 0;  ///< tick 0: an empty place
+    Message message;
   };
-  struct WaitingRecord : Waiting {
-    softarm_messages::tick_record_t message;
+  using WaitingRecord = Waiting<softarm_messages::tick_record_t>;
+  /// Messages of one kind, by their tick.
+  template <class Message>
+  struct Window {
+    Waiting<Message>& at(std::int64_t tick) {
+      return (*places)[static_cast<std::size_t>(tick) % kWindow];
+    }
+    using Places = std::array<Waiting<Message>, kWindow>;
+    std::unique_ptr<Places> places = std::make_unique<Places>();
+    Waiting<Message> incoming;
   };
-  struct WaitingPressures : Waiting {
-    softarm_messages::pressure_command_t message;
-  };
-  struct WaitingTorques : Waiting {
-    softarm_messages::torque_command_t message;
-  };
-  struct WaitingStatus : Waiting {
-    softarm_messages::controller_status_t message;
-  };
-  template <class Kind>
-  using Window = std::array<Kind, kWindow>;
 
-  template <class Kind>
-  static Kind& place(Window<Kind>& window, std::int64_t tick) {
-    return window[static_cast<std::size_t>(tick) % kWindow];
-  }
-  template <class Kind, class Tick>
-  void keep(const LogEvent& event, Window<Kind>& window, Kind& incoming, Tick tick_of);
+  template <class Message, class Tick>
+  void keep(const LogEvent& event, Window<Message>& window, Tick tick_of);
   void take_record(const LogEvent& event);
   bool fits(const softarm_messages::tick_record_t& record) const;
   void begin_run(const softarm_messages::tick_record_t& first);
@@ -123,8 +118,8 @@ class Replay {
   void add_gap(std::int64_t first, std::int64_t last, const WaitingRecord& next);
   void run(const WaitingRecord& record);
   void compare(const WaitingRecord& record);
-  template <class Kind, class Message>
-  void compare_waiting(Window<Kind>& window, const WaitingRecord& record, Message& replayed,
+  template <class Message>
+  void compare_waiting(Window<Message>& window, const WaitingRecord& record, Message& replayed,
                        const char* name, ReplayCount& count);
   void note(std::vector<FieldDifference> fields, const WaitingRecord& record, std::int64_t position,
             const char* message);
@@ -139,14 +134,10 @@ class Replay {
   RecordedInput input_;
   std::vector<double> command_;
 
-  std::unique_ptr<Window<WaitingRecord>> records_;
-  std::unique_ptr<Window<WaitingPressures>> pressures_;
-  std::unique_ptr<Window<WaitingTorques>> torques_;
-  std::unique_ptr<Window<WaitingStatus>> statuses_;
-  WaitingRecord incoming_record_;
-  WaitingPressures incoming_pressures_;
-  WaitingTorques incoming_torques_;
-  WaitingStatus incoming_status_;
+  Window<softarm_messages::tick_record_t> records_;
+  Window<softarm_messages::pressure_command_t> pressures_;
+  Window<softarm_messages::torque_command_t> torques_;
+  Window<softarm_messages::controller_status_t> statuses_;
 
   bool running_ = false;
   bool exact_ = false;         ///< every tick of this run so far was in the log

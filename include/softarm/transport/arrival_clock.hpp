@@ -3,6 +3,7 @@
 
 #include <cstdint>
 
+#include "softarm/base/clock.hpp"
 #include "softarm/base/time.hpp"
 
 namespace softarm {
@@ -12,7 +13,7 @@ namespace softarm {
 /// set between two looks, a stamp may belong to the clock before or after; of the possible arrivals
 /// the later one counts. So setting the clock never makes a packet appear older than it is, and
 /// younger by no more than the time from its arrival to the look. Allocates nothing, throws
-/// nothing, reads no clock.
+/// nothing.
 class ArrivalClock {
  public:
   /// Longest time that a packet may have waited in the kernel or in LCM's queue before the previous
@@ -20,11 +21,11 @@ class ArrivalClock {
   static constexpr std::int64_t kLongestWait_ns = 100'000'000;
 
   /// The first `look`.
-  ArrivalClock(std::int64_t monotonic_ns, std::int64_t wall_ns) noexcept;
+  explicit ArrivalClock(ClockPair now = read_clocks()) noexcept;
 
   /// Takes both clocks, read together. Packets passed to `arrival_ns` from here on arrived by
-  /// `monotonic_ns`.
-  void look(std::int64_t monotonic_ns, std::int64_t wall_ns) noexcept;
+  /// `now`.
+  void look(ClockPair now = read_clocks()) noexcept;
 
   /// Arrival of a packet stamped `stamp_us`, in ns of the monotonic clock. Call in order of
   /// arrival; the results do not decrease. For an impossible stamp it is the time of the look.

@@ -77,7 +77,6 @@ class LcmNode {
     Handler handler;
     ArrivalClock* arrivals;
   };
-  void look_at_clocks() noexcept;
   static void dispatch(const _lcm_recv_buf_t* packet, const char* channel, void* user) noexcept;
 
   _lcm_t* lcm_ = nullptr;

@@ -2,7 +2,7 @@
 // new one is a MocapFormat and one line:
 //
 //   class MyFormat final : public MocapFormat { ... };
-//   const MocapSourceRegistration kMine({.label = "my_cameras", .make = make_my_format});
+//   const MocapSourceRegistration kMine({.label = "my_cameras", .make = made<MocapFormat, MyFormat>});
 #pragma once
 
 #include <array>
@@ -57,6 +57,12 @@ enum class QuaternionOrder { xyzw, wxyz };
 
 /// Of positions as they are sent.
 enum class LengthUnit { metre, millimetre };
+
+/// For the functions below: a new T, as what it is derived from.
+template <class Base, class T, class... Arguments>
+std::unique_ptr<Base> made(Arguments... arguments) {
+  return std::make_unique<T>(arguments...);
+}
 
 struct TransportSettings;
 class MocapConnection;

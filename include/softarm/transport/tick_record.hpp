@@ -14,6 +14,8 @@
 
 namespace softarm {
 
+inline constexpr std::size_t kRecordDigest = 8;  ///< bytes at the end of every record
+
 /// Writes every field of `input` into the record. Allocates nothing if the record's lists are long
 /// enough already (in size or capacity).
 void to_record(const TickInput& input, softarm_messages::tick_record_t& record);

@@ -43,11 +43,9 @@ int calibrate(const CalibrateOptions& options) {
       "Marker frames, S_i on the marker bodies: softarm calibrate {}, {} frames at rest.",
       version_text(), found.body.back().frames);
   const fs::path folder = fs::absolute(output->partial()).parent_path();
-  output->write(
+  write_experiment(
+      *output,
       calibrated_yaml(found, note, fs::proximate(fs::absolute(options.config), folder).string()));
-  output->flush();
-  load_experiment(output->partial());
-  output->commit();
   fmt::print("{} has the marker frames: softarm check {}\n", options.output, options.output);
   return kExitOk;
 }
@@ -70,9 +68,7 @@ void add_calibrate_command(CLI::App& app) {
           "arm.base.rotation (arm)")
       ->transform(one_word_of(std::map<std::string, BaseSource>{{"plate", BaseSource::marker_frame},
                                                                 {"arm", BaseSource::arm}}));
-  command->callback([options] {
-    if (const int code = calibrate(*options); code != kExitOk) throw CLI::RuntimeError(code);
-  });
+  run_where_given(*command, [options] { return calibrate(*options); });
 }
 
 }  // namespace softarm

@@ -124,9 +124,7 @@ void add_check_command(CLI::App& app) {
           "do not simulate the loop (as for more than 6 segments), which takes about a second")
       ->excludes(margins);
   add_live_options(*command, *options);
-  command->callback([options] {
-    if (const int code = check(*options); code != kExitOk) throw CLI::RuntimeError(code);
-  });
+  run_where_given(*command, [options] { return check(*options); });
 }
 
 }  // namespace softarm

@@ -1,15 +1,10 @@
 #include "apps/softarm/closed_loop_run.hpp"
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <signal.h>
-#include <spawn.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include <cmath>
-#include <system_error>
 
+#include "apps/child_process.hpp"
 #include "apps/progress.hpp"
 #include "apps/signals.hpp"
 #include "softarm/client/arm_client.hpp"
@@ -23,46 +18,6 @@ namespace fs = std::filesystem;
 constexpr double kStart_s = 10.0;        ///< until the first status
 constexpr double kSettle_s = 1.0;        ///< of ACTIVE before errors count
 constexpr double kLongestWait_s = 20.0;  ///< not ACTIVE, in all
-
-/// softarmd as a child; ended, which vents the arm, at the latest with this object.
-class Daemon {
- public:
-  Daemon(const fs::path& config, const fs::path& output) {
-    const std::string program = fs::read_symlink("/proc/self/exe").parent_path() / "softarmd";
-    const std::string file = config.string();
-    char* const arguments[] = {const_cast<char*>(program.c_str()), const_cast<char*>(file.c_str()),
-                               nullptr};
-    posix_spawn_file_actions_t actions;
-    posix_spawn_file_actions_init(&actions);
-    posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, output.c_str(),
-                                     O_WRONLY | O_CREAT | O_TRUNC, 0644);
-    posix_spawn_file_actions_adddup2(&actions, STDOUT_FILENO, STDERR_FILENO);
-    // In a separate process group: a Ctrl-C is for us, who then disarm it.
-    posix_spawnattr_t attributes;
-    posix_spawnattr_init(&attributes);
-    posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);
-    const int error =
-        posix_spawn(&child_, program.c_str(), &actions, &attributes, arguments, environ);
-    posix_spawnattr_destroy(&attributes);
-    posix_spawn_file_actions_destroy(&actions);
-    if (error != 0) throw std::system_error(error, std::generic_category(), program);
-  }
-  ~Daemon() {
-    if (!runs()) return;
-    kill(child_, SIGTERM);
-    waitpid(child_, nullptr, 0);  // it ends when the arm is vented
-  }
-  Daemon(const Daemon&) = delete;
-  Daemon& operator=(const Daemon&) = delete;
-
-  bool runs() {
-    if (child_ > 0 && waitpid(child_, nullptr, WNOHANG) == child_) child_ = 0;
-    return child_ > 0;
-  }
-
- private:
-  pid_t child_ = 0;
-};
 
 /// Errors of the estimate, status by status.
 struct Errors {
@@ -80,7 +35,7 @@ struct Errors {
 };
 
 /// Arms, and waits for `duration_s` of ACTIVE. Returns why not.
-std::string follow(OperatorClient& client, Daemon& daemon, StatusRecord& record,
+std::string follow(OperatorClient& client, ChildProcess& daemon, StatusRecord& record,
                    double duration_s) {
   if (!client.wait_for_status(kStart_s)) return "softarmd gives no status";
   if (client.request(OperatorRequest::arm) != RequestOutcome::done)
@@ -117,7 +72,8 @@ ClosedLoopRun run_closed_loop(const fs::path& config, const fs::path& folder, do
   client.on_status([&](const ArmStatus& status) { errors.add(status, record.active_s()); });
   ClosedLoopRun run;
   {
-    Daemon daemon(config, folder / "softarmd.txt");
+    ChildProcess daemon(program_beside_this("softarmd"), {config.string()}, folder / "softarmd.txt",
+                        SIGTERM);  // it ends when the arm is vented
     run.failure = follow(client, daemon, record, duration_s);
     client.request(OperatorRequest::disarm);
   }

@@ -68,18 +68,15 @@ std::string report(const CommissionSettings& settings, const Journal& journal) {
 int commission(const CommissionOptions& options) {
   const CommissionSettings& settings = options.settings;
   const Experiment experiment = load_experiment(settings.config);
-  if (const auto file = foreign_file(settings); !file.empty()) {
-    print_error("softarm", fmt::format("{} is not from softarm commission: another --out, please",
-                                       file.string()));
-    return kExitUsage;
-  }
-  if (options.yes && !is_simulated(experiment)) {
-    print_error("softarm",
+  if (const auto file = foreign_file(settings); !file.empty())
+    return fail(
+        "softarm", kExitUsage,
+        fmt::format("{} is not from softarm commission: another --out, please", file.string()));
+  if (options.yes && !is_simulated(experiment))
+    return fail("softarm", kExitUsage,
                 fmt::format("--yes is for a simulated arm; none is heard on {}: a real one moves "
                             "only when somebody who sees it agrees",
                             experiment.transport.lcm.plant_channel));
-    return kExitUsage;
-  }
   Journal journal(settings.folder);
   catch_stop_signals();
   ignore_broken_pipes();
@@ -143,9 +140,7 @@ void add_commission_command(CLI::App& app) {
       ->add_option("--gains", settings.gains,
                    "separate gains for each: (default) arm, side, segment or chamber")
       ->transform(one_word_of(sharing));
-  command->callback([options] {
-    if (const int code = commission(*options); code != kExitOk) throw CLI::RuntimeError(code);
-  });
+  run_where_given(*command, [options] { return commission(*options); });
 }
 
 }  // namespace softarm

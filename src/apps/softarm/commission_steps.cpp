@@ -27,14 +27,10 @@ namespace {
 namespace fs = std::filesystem;
 constexpr double kFollows = 0.2;  ///< an arm whose error is below this part of its bend follows
 
-/// Writes an experiment, never over one that it includes, and loads it.
-Experiment write_experiment(const fs::path& file, const Experiment& from, const std::string& text) {
+/// Never over one that it includes.
+void write(const fs::path& file, const Experiment& from, const std::string& text) {
   OutputFile output(file, from.files);
-  output.write(text);
-  output.flush();
-  Experiment made = load_experiment(output.partial());
-  output.commit();
-  return made;
+  write_experiment(output, text);
 }
 
 std::string seen_from(const fs::path& folder, const fs::path& config) {
@@ -70,12 +66,12 @@ StepOutcome calibrate(const CommissionSettings& settings) {
       [&](const std::string& text) { progress.update(text); });
   const RestCalibration found = calibrate_rest(experiment, frames, BaseSource::marker_frame);
   fmt::print("{}", calibration_text(experiment, found));
-  write_experiment(settings.calibrated(), experiment,
-                   calibrated_yaml(found,
-                                   fmt::format("Marker frames: softarm commission {}, {} frames at "
-                                               "rest.",
-                                               version_text(), found.body.back().frames),
-                                   seen_from(settings.folder, settings.config)));
+  write(settings.calibrated(), experiment,
+        calibrated_yaml(found,
+                        fmt::format("Marker frames: softarm commission {}, {} frames at "
+                                    "rest.",
+                                    version_text(), found.body.back().frames),
+                        seen_from(settings.folder, settings.config)));
   return {kExitOk, fmt::format("marker frames from {} frames at rest in {}",
                                found.body.back().frames, settings.calibrated().string())};
 }
@@ -100,18 +96,18 @@ StepOutcome identify_arm(const CommissionSettings& settings) {
   fmt::print("{}{}", fit_table(set, fit), conditioning_text(set, fit));
   const std::string found = fmt::format("residual {:.3g} mrad rms of a motion of {:.3g} mrad rms",
                                         1e3 * fit.rms_rad, 1e3 * fit.motion_rms_rad);
-  write_experiment(settings.identified(), experiment,
-                   identified_yaml(experiment, set.arm(fit.x), choice,
-                                   fmt::format("Identified by softarm commission {}: {}.",
-                                               version_text(), found),
-                                   settings.calibrated(), settings.identified()));
+  write(settings.identified(), experiment,
+        identified_yaml(
+            experiment, set.arm(fit.x), choice,
+            fmt::format("Identified by softarm commission {}: {}.", version_text(), found),
+            settings.calibrated(), settings.identified()));
   return {kExitOk, found + " in " + settings.identified().string()};
 }
 
 StepOutcome follow(const CommissionSettings& settings, const char* name, double bend_rad,
                    double duration_s, const std::string& text) {
   const fs::path file = settings.motion(name);
-  write_experiment(file, load_experiment(settings.identified()), text);
+  write(file, load_experiment(settings.identified()), text);
   const fs::path folder = settings.folder / name;
   const ClosedLoopRun run = run_closed_loop(file, folder, duration_s);
   fmt::print("{}", run.table);

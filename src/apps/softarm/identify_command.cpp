@@ -49,10 +49,9 @@ int identify(IdentifyCommand& command) {
   if (command.coverage) return print_coverage(experiment, command);
   // Checked before the arm moves, not after.
   const auto folder = (std::filesystem::path(".") / command.output).parent_path();
-  if (!std::filesystem::is_directory(folder)) {
-    print_error("softarm", fmt::format("--output: there is no folder {}", folder.string()));
-    return kExitUsage;
-  }
+  if (!std::filesystem::is_directory(folder))
+    return fail("softarm", kExitUsage,
+                fmt::format("--output: there is no folder {}", folder.string()));
   Findings findings(experiment, command);
 
   const std::vector<MotionRecord> records = records_of(experiment, command);
@@ -60,12 +59,10 @@ int identify(IdentifyCommand& command) {
   std::vector<MotionRecord> held_out;
   for (const std::string& log : command.held_out)
     held_out.push_back(record_of(experiment, log, command));
-  if (records.size() > 1 && (command.linear || command.compare)) {
-    print_error("softarm",
+  if (records.size() > 1 && (command.linear || command.compare))
+    return fail("softarm", kExitUsage,
                 "several logs: expected neither --linear nor --compare; --choose-terms "
                 "compares terms on several logs");
-    return kExitUsage;
-  }
   const ParameterSet set(configured(experiment), experiment.actuation.kind, command.choice);
   if (command.linear) {
     const LinearFit fit = fit_linear_and_lag(
@@ -124,17 +121,15 @@ void add_identify_command(CLI::App& app) {
   CLI::App* command = app.add_subcommand(
       "identify", "Stiffness, damping, gains and lag from steps or from a recorded motion");
   add_identify_options(*command, *options);
-  command->callback([options, command] {
+  run_where_given(*command, [options, command] {
     options->has_seed = command->count("--seed") > 0;
     options->has_hold = command->count("--hold") > 0;
     options->coverage = command->count("--seeds") > 0;
     options->study.window_s = options->options.window_s;
-    int code = identify(*options);
-    if (!options->damage.empty()) {
-      print_error("softarm", options->damage);
-      if (code == kExitOk) code = kExitData;
-    }
-    if (code != kExitOk) throw CLI::RuntimeError(code);
+    const int code = identify(*options);
+    if (options->damage.empty()) return code;
+    print_error("softarm", options->damage);
+    return code == kExitOk ? int{kExitData} : code;
   });
 }
 

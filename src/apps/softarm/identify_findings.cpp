@@ -42,11 +42,8 @@ void write_findings(const Experiment& experiment, const IdentifyCommand& command
                              : fmt::format("{}", fmt::join(command.logs, ", ")),
       1e3 * fit.rms_rad, 1e3 * fit.motion_rms_rad);
   OutputFile& output = *findings.experiment;
-  output.write(
-      identified_yaml(experiment, arm, command.choice, note, command.config, output.partial()));
-  output.flush();
-  load_experiment(output.partial());
-  output.commit();
+  write_experiment(output, identified_yaml(experiment, arm, command.choice, note, command.config,
+                                           output.partial()));
   fmt::print("{} has the values found: softarm run {}\n", command.output, command.output);
 }
 

@@ -64,10 +64,8 @@ class Jog {
 
   int run() {
     client_.wait_for([] { return stop_requested != 0; }, kListen_s);
-    if (const std::string other = client_.other_commander(); !other.empty()) {
-      print_error("softarm", other);
-      return kExitOtherInstance;
-    }
+    if (const std::string other = client_.other_commander(); !other.empty())
+      return fail("softarm", kExitOtherInstance, other);
     const RawTerminal terminal;
     fmt::print("hold a key to fill chamber {} of segment {} with {:.3f} bar; q ends\n",
                options_.chamber, options_.segment, options_.pressure_bar);
@@ -141,10 +139,8 @@ class Jog {
 
 int jog(const JogOptions& options) {
   const Experiment experiment = load_experiment(options.config);
-  if (const std::string wrong = refusal(experiment, options); !wrong.empty()) {
-    print_error("softarm", wrong);
-    return kExitUsage;
-  }
+  if (const std::string wrong = refusal(experiment, options); !wrong.empty())
+    return fail("softarm", kExitUsage, wrong);
   catch_stop_signals();
   ignore_broken_pipes();
   return Jog(experiment, options).run();
@@ -168,9 +164,7 @@ void add_jog_command(CLI::App& app) {
   command->add_option("PRESSURE", options->pressure_bar, "in bar")
       ->required()
       ->check(number_between(0.0, 1e3));
-  command->callback([options] {
-    if (const int code = jog(*options); code != kExitOk) throw CLI::RuntimeError(code);
-  });
+  run_where_given(*command, [options] { return jog(*options); });
 }
 
 }  // namespace softarm

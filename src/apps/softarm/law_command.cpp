@@ -1,13 +1,12 @@
 // softarm law: a control law in Python for a running softarmd. The Python package does it.
-#include <cerrno>
-#include <cstring>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "apps/program.hpp"
+#include "apps/python.hpp"
 #include "apps/softarm/commands.hpp"
-#include "apps/softarm/python_module.hpp"
 
 namespace softarm {
 namespace {
@@ -30,15 +29,13 @@ void add_law_command(CLI::App& app) {
   command->add_option("CONFIG", options->config, "experiment in YAML")->required();
   command->add_option("--duration", options->duration_s, "s; left out: until it is ended")
       ->check(positive_seconds());
-  command->callback([options] {
-    std::vector<std::string> words = {options->law, options->config};
+  run_where_given(*command, [options] {
+    std::vector<std::string> words = {"-m", "softarm.law", options->law, options->config};
     if (options->duration_s > 0.0) {
       words.emplace_back("--duration");
       words.push_back(std::to_string(options->duration_s));
     }
-    const std::string python = run_python_module("softarm.law", words);
-    print_error("softarm", "cannot start " + python + ": " + std::strerror(errno));
-    throw CLI::RuntimeError(kExitFailure);
+    return become_python("softarm", std::move(words));
   });
 }
 

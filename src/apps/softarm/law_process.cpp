@@ -11,8 +11,7 @@
 #include <cstring>
 #include <stdexcept>
 
-#include "apps/program.hpp"
-#include "apps/softarm/python_module.hpp"
+#include "apps/python.hpp"
 #include "softarm/transport/lcm_node.hpp"
 #include "softarm/transport/message_decoding.hpp"
 
@@ -31,9 +30,8 @@ LawProcess::LawProcess(const std::string& law, const std::string& config,
   if (pid_ == 0) {
     ::prctl(PR_SET_PDEATHSIG, SIGKILL);
     ::fcntl(ends[1], F_SETFD, 0);
-    const std::string python =
-        run_python_module("softarm.law", {law, config, "--socket", std::to_string(ends[1])});
-    print_error("softarm", "cannot start " + python + ": " + std::strerror(errno));
+    become_python("softarm",
+                  {"-m", "softarm.law", law, config, "--socket", std::to_string(ends[1])});
     ::_exit(127);
   }
   ::close(ends[1]);

@@ -8,6 +8,7 @@
 #include "softarm/base/version.hpp"
 #include "softarm/commissioning/identification/learned_arm.hpp"
 #include "softarm/config/load.hpp"
+#include "softarm/recording/experiment_log.hpp"
 
 namespace softarm {
 
@@ -31,9 +32,7 @@ LearnedOutput::LearnedOutput(const std::string& file, const Experiment& experime
   const auto folder = (std::filesystem::path(".") / file).parent_path();
   if (!std::filesystem::is_directory(folder))
     throw CLI::ValidationError("--learned", "there is no folder " + folder.string());
-  Files all = experiment.files;
-  all.insert(all.end(), inputs.begin(), inputs.end());
-  output_.emplace(file, all);
+  output_.emplace(file, inputs_of(experiment, inputs));
 }
 
 std::string LearnedOutput::write(const std::optional<ObserverReport>& learned,
@@ -41,10 +40,8 @@ std::string LearnedOutput::write(const std::optional<ObserverReport>& learned,
   if (!output_) return "";
   if (!learned) return file_ + " was not written: the observer did not run in ACTIVE";
   const std::string note = fmt::format("Learnt by softarm {} from {}.", version_text(), source);
-  output_->write(learned_yaml(experiment_, *learned, note, config_, output_->partial()));
-  output_->flush();
-  load_experiment(output_->partial());
-  output_->commit();
+  write_experiment(*output_,
+                   learned_yaml(experiment_, *learned, note, config_, output_->partial()));
   fmt::print("{} has what was learnt: softarm run {}\n", file_, file_);
   return "";
 }

@@ -38,15 +38,13 @@ int pulse(const LiveCheckOptions& options, ArmClient& client, Observer& observer
   const std::vector<Finding> at_rest = preflight(experiment, observer.seen());
   if (!other.empty()) {
     print(at_rest, options.json);
-    print_error("softarm", "no chamber was filled: " + other);
-    return kExitOtherInstance;
+    return fail("softarm", kExitOtherInstance, "no chamber was filled: " + other);
   }
   if (const std::string obstacle = obstacle_to_pulses(at_rest); !obstacle.empty()) {
     print(at_rest, options.json);
-    print_error(
-        "softarm",
+    return fail(
+        "softarm", kExitFailure,
         "no chamber was filled: its limits could not be watched without these: " + obstacle);
-    return kExitFailure;
   }
   say("softarm check: filling every chamber softly, one after the other: THE ARM MOVES. Ctrl-C "
       "vents.\n");
@@ -55,28 +53,24 @@ int pulse(const LiveCheckOptions& options, ArmClient& client, Observer& observer
       [&](const std::string& text) { progress.update(text); });
   const int code = print(preflight(experiment, observer.seen()), options.json);
   if (aborted.empty()) return code;
-  print_error("softarm",
+  return fail("softarm", kExitFailure,
               fmt::format("vented after {} of {} chambers: {}", observer.seen().pulses.size(),
                           chamber_count(experiment.actuation), aborted));
-  return kExitFailure;
 }
 
 }  // namespace
 
 int check_live(const Experiment& experiment, const LiveCheckOptions& options) {
-  if (options.pulse && experiment.actuation.kind == ActuationKind::torque) {
-    print_error("softarm", "--pulse fills chambers; expected actuation by chambers, got torque");
-    return kExitUsage;
-  }
+  if (options.pulse && experiment.actuation.kind == ActuationKind::torque)
+    return fail("softarm", kExitUsage,
+                "--pulse fills chambers; expected actuation by chambers, got torque");
   const double highest_bar = experiment.actuation.max_pressure_bar;
-  if (options.plan.pressure_bar + experiment.actuation.min_pressure_bar > highest_bar) {
-    print_error(
-        "softarm",
+  if (options.plan.pressure_bar + experiment.actuation.min_pressure_bar > highest_bar)
+    return fail(
+        "softarm", kExitUsage,
         fmt::format("--pressure: expected at most actuation.max_pressure_bar of {} bar, got "
                     "{} bar",
                     highest_bar, options.plan.pressure_bar));
-    return kExitUsage;
-  }
   catch_stop_signals();
   ignore_broken_pipes();
   ArmClient client(experiment);
@@ -85,10 +79,9 @@ int check_live(const Experiment& experiment, const LiveCheckOptions& options) {
   Observer observer(client);
   Progress progress(!options.json);
   listen(client, observer, options.listen_s, progress);
-  if (stop_requested != 0) {
-    print_error("softarm", "interrupted while listening: nothing was commanded or judged");
-    return kExitFailure;
-  }
+  if (stop_requested != 0)
+    return fail("softarm", kExitFailure,
+                "interrupted while listening: nothing was commanded or judged");
   if (options.pulse) return pulse(options, client, observer, progress);
   return print(preflight(experiment, observer.seen()), options.json);
 }

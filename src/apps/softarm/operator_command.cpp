@@ -67,16 +67,14 @@ int request(const std::string& config, const Kind& kind) {
                waits ? "; the arm moves once every segment has been seen for a while" : "");
     return kExitOk;
   }
-  if (outcome == RequestOutcome::unheard) {
-    print_error("softarm", fmt::format("no status on {}: is softarmd {} running?",
-                                       lcm.status_channel, config));
-    return kExitFailure;
-  }
+  if (outcome == RequestOutcome::unheard)
+    return fail(
+        "softarm", kExitFailure,
+        fmt::format("no status on {}: is softarmd {} running?", lcm.status_channel, config));
   const bool faulty = client.status()->mode == Mode::fault;
-  print_error("softarm",
+  return fail("softarm", kExitFailure,
               fmt::format("softarmd did not {}; its mode is {}{}", kind.command,
                           client.daemon_text(), arming && faulty ? "; disarm first" : ""));
-  return kExitFailure;
 }
 
 /// Loads in a thread that may take as long as it likes, for a file that may be slow or hostile.
@@ -133,12 +131,11 @@ int emergency_stop(const std::string& config, const Kind& kind) {
 int hold_deadman(const std::string& config) {
   const Experiment experiment = load_experiment(config);
   const std::string& channel = experiment.transport.lcm.deadman_channel;
-  if (channel.empty()) {
-    print_error("softarm", fmt::format("{} has no dead-man input: name its channel in "
-                                       "daemon.lcm.deadman_channel",
-                                       config));
-    return kExitConfiguration;
-  }
+  if (channel.empty())
+    return fail("softarm", kExitConfiguration,
+                fmt::format("{} has no dead-man input: name its channel in "
+                            "daemon.lcm.deadman_channel",
+                            config));
   catch_stop_signals();
   OperatorClient client(experiment.transport.lcm);
   const double period_s = 0.1 * experiment.safety.deadman_timeout_s;
@@ -159,9 +156,7 @@ void add(CLI::App& app, const char* name, const char* help,
   auto config = std::make_shared<std::string>();
   CLI::App* command = app.add_subcommand(name, help);
   command->add_option("CONFIG", *config, "experiment in YAML")->required();
-  command->callback([config, body] {
-    if (const int code = body(*config); code != kExitOk) throw CLI::RuntimeError(code);
-  });
+  run_where_given(*command, [config, body] { return body(*config); });
 }
 
 }  // namespace

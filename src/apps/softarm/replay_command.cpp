@@ -72,12 +72,11 @@ std::string json_report(const ReplaySummary& summary, const EventLogReader& log)
 
 int replay(const ReplayOptions& options) {
   const Experiment experiment = load_experiment(options.config);
-  if (experiment.transport.lcm.tick_channel.empty()) {
-    print_error("softarm", fmt::format("{}: daemon.lcm.tick_channel is empty, so nothing was "
-                                       "recorded that could be replayed",
-                                       options.config));
-    return kExitConfiguration;
-  }
+  if (experiment.transport.lcm.tick_channel.empty())
+    return fail("softarm", kExitConfiguration,
+                fmt::format("{}: daemon.lcm.tick_channel is empty, so nothing was "
+                            "recorded that could be replayed",
+                            options.config));
   EventLogReader log(std::filesystem::path(options.log));
   const auto size = static_cast<double>(std::filesystem::file_size(options.log));
   Replay replay(experiment, build_text(), options.any_configuration);
@@ -91,8 +90,7 @@ int replay(const ReplayOptions& options) {
     }
     replay.finish();
   } catch (const OtherConfiguration& other) {
-    print_error("softarm", fmt::format("{}: {}", options.config, other.what()));
-    return kExitConfiguration;
+    return fail("softarm", kExitConfiguration, fmt::format("{}: {}", options.config, other.what()));
   }
   const ReplaySummary& summary = replay.summary();
   if (summary.other_build)
@@ -132,9 +130,7 @@ void add_replay_command(CLI::App& app) {
   command->footer(
       "Exit code: 0 every command identical, 2 one differs, 65 the log is damaged, has gaps or no "
       "ticks (what could be compared is identical), 78 another configuration.");
-  command->callback([options] {
-    if (const int code = replay(*options); code != kExitOk) throw CLI::RuntimeError(code);
-  });
+  run_where_given(*command, [options] { return replay(*options); });
 }
 
 }  // namespace softarm

@@ -42,13 +42,12 @@ int report(const ReportOptions& options) {
     }
   }
   record.close();
-  if (record.rows() == 0) {
-    print_error("softarm", fmt::format("{} holds no status of an arm of {} segments on channel {}; "
-                                       "daemon.lcm.status_channel is the one expected",
-                                       options.log, experiment.arm.size(),
-                                       experiment.transport.lcm.status_channel));
-    return kExitData;
-  }
+  if (record.rows() == 0)
+    return fail(
+        "softarm", kExitData,
+        fmt::format("{} holds no status of an arm of {} segments on channel {}; "
+                    "daemon.lcm.status_channel is the one expected",
+                    options.log, experiment.arm.size(), experiment.transport.lcm.status_channel));
   if (record.status().configuration_hash != experiment.hash) {
     say(fmt::format(
         "softarm: warning: the log was made with configuration {:016x}, {} is {:016x}: what the "
@@ -59,15 +58,19 @@ int report(const ReportOptions& options) {
   if (options.plots) draw_plots(options.out);
   std::string failure = learned.write(record.summary().observer(), options.log);
   if (!record.failure().empty()) failure = record.failure();
-  if (!failure.empty()) {
-    print_error("softarm", failure);
-    return kExitFailure;
-  }
-  if (log.damage_count() > 0) {
-    print_error("softarm", options.log + ": " + log.damage_text());
-    return kExitData;
-  }
+  if (!failure.empty()) return fail("softarm", kExitFailure, failure);
+  if (log.damage_count() > 0)
+    return fail("softarm", kExitData, options.log + ": " + log.damage_text());
   return kExitOk;
+}
+
+int tabulate(const std::string& folder) {
+  const RunsTable table = runs_table(folder);
+  fmt::print("{}", table.text);
+  for (const auto& file : table.unreadable)
+    print_error("softarm",
+                file.string() + ": expected the summary of a run, got none that can be read");
+  return table.unreadable.empty() ? kExitOk : kExitFailure;
 }
 
 }  // namespace
@@ -83,13 +86,10 @@ void add_report_command(CLI::App& app) {
       ->capture_default_str();
   add_learned_option(*command, options->learned);
   command->add_flag("!--no-plots", options->plots, "do not draw the plots");
-  command->callback([options] {
-    if (std::filesystem::is_directory(options->log)) {
-      fmt::print("{}", runs_table(options->log));
-      return;
-    }
+  run_where_given(*command, [options]() -> int {
+    if (std::filesystem::is_directory(options->log)) return tabulate(options->log);
     if (options->config.empty()) throw CLI::RequiredError("CONFIG");
-    if (const int code = report(*options); code != kExitOk) throw CLI::RuntimeError(code);
+    return report(*options);
   });
 }
 

@@ -7,12 +7,12 @@
 
 #include "apps/program.hpp"
 #include "apps/progress.hpp"
+#include "apps/python.hpp"
 #include "apps/signals.hpp"
 #include "apps/softarm/commands.hpp"
 #include "apps/softarm/law_process.hpp"
 #include "apps/softarm/learned_output.hpp"
 #include "apps/softarm/plots.hpp"
-#include "apps/softarm/python_module.hpp"
 #include "softarm/base/clock.hpp"
 #include "softarm/base/time.hpp"
 #include "softarm/config/load.hpp"
@@ -78,10 +78,9 @@ int run(const RunOptions& options) {
   Experiment experiment = load_experiment(options.config);
   if (options.has_seed) experiment.seed = experiment.plant.seed = options.seed;
   if (!options.law.empty()) experiment.control.law = ExternalLaw{};
-  if (options.law.empty() && experiment.control.law.get_if<ExternalLaw>() != nullptr) {
-    print_error("softarm", "control.law is external: in simulation name it, --law MODULE:CLASS");
-    return kExitUsage;
-  }
+  if (options.law.empty() && experiment.control.law.get_if<ExternalLaw>() != nullptr)
+    return fail("softarm", kExitUsage,
+                "control.law is external: in simulation name it, --law MODULE:CLASS");
   const double duration_s =
       options.duration_s > 0.0 ? options.duration_s : experiment.run.duration_s;
   const double period_s = 1.0 / experiment.rate_hz;
@@ -191,9 +190,9 @@ void add_run_command(CLI::App& app) {
                    ->add_option("--seed", options->seed,
                                 "seed of noise and dropouts (default: the configuration's)")
                    ->check(seed_number());
-  command->callback([options, seed] {
+  run_where_given(*command, [options, seed] {
     options->has_seed = seed->count() > 0;
-    if (const int code = run(*options); code != kExitOk) throw CLI::RuntimeError(code);
+    return run(*options);
   });
 }
 

@@ -1,12 +1,10 @@
 // softarm view: the arm in a browser. The page is made by the Python package.
-#include <cerrno>
-#include <cstring>
 #include <memory>
 #include <string>
 
 #include "apps/program.hpp"
+#include "apps/python.hpp"
 #include "apps/softarm/commands.hpp"
-#include "apps/softarm/python_module.hpp"
 
 namespace softarm {
 namespace {
@@ -18,16 +16,6 @@ struct ViewOptions {
   int port = 8080;
   bool control = false;
 };
-
-/// Replaces this program; returns only where that fails.
-int view(const ViewOptions& options) {
-  const std::string python = run_python_module(
-      "softarm.view", {options.config, options.log, options.host, std::to_string(options.port),
-                       options.control ? "control" : ""});
-  print_error("softarm", "cannot start " + python + ": " + std::strerror(errno) +
-                             "; tools/python_environment makes a Python for this");
-  return kExitFailure;
-}
 
 }  // namespace
 
@@ -49,8 +37,10 @@ void add_view_command(CLI::App& app) {
                  "buttons to arm, disarm and stop a running arm; sliders for a "
                  "simulated one without a daemon")
       ->excludes(log);
-  command->callback([options] {
-    if (const int code = view(*options); code != kExitOk) throw CLI::RuntimeError(code);
+  run_where_given(*command, [options] {
+    return become_python("softarm",
+                         {"-m", "softarm.view", options->config, options->log, options->host,
+                          std::to_string(options->port), options->control ? "control" : ""});
   });
 }
 

@@ -85,16 +85,13 @@ int watch(const WatchOptions& options) {
       progress.update(progress_text(record, options.duration_s));
   }
   record.close();
-  if (record.rows() == 0) {
-    print_error("softarm", fmt::format("no status on {}", lcm.status_channel));
-    return kExitFailure;
-  }
+  if (record.rows() == 0)
+    return fail("softarm", kExitFailure, fmt::format("no status on {}", lcm.status_channel));
   fmt::print("{}", record.table());
   std::string failure = learned.write(record.summary().observer(), "a run that was watched");
   if (!record.failure().empty()) failure = record.failure();
   if (failure.empty()) return kExitOk;
-  print_error("softarm", failure);
-  return kExitFailure;
+  return fail("softarm", kExitFailure, failure);
 }
 
 }  // namespace
@@ -110,9 +107,7 @@ void add_watch_command(CLI::App& app) {
                    "stop after so many seconds of ACTIVE (default: at Ctrl-C)")
       ->check(positive_seconds());
   add_learned_option(*command, options->learned);
-  command->callback([options] {
-    if (const int code = watch(*options); code != kExitOk) throw CLI::RuntimeError(code);
-  });
+  run_where_given(*command, [options] { return watch(*options); });
 }
 
 }  // namespace softarm

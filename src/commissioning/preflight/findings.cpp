@@ -9,15 +9,8 @@ namespace softarm {
 namespace {
 
 const char* name(Verdict verdict) {
-  switch (verdict) {
-    case Verdict::pass:
-      return "pass";
-    case Verdict::fail:
-      return "FAIL";
-    case Verdict::not_checked:
-      return "not checked";
-  }
-  return "unknown";
+  constexpr const char* kNames[] = {"pass", "FAIL", "not checked"};
+  return kNames[static_cast<std::size_t>(verdict)];
 }
 
 std::ptrdiff_t count(std::span<const Finding> findings, Verdict verdict) {

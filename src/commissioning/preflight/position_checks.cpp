@@ -111,7 +111,6 @@ Poses poses_of(const Experiment& experiment, const Observation& seen,
 }
 
 Finding check_still(const Experiment& experiment, const Observation& seen, const MeanPoses& rest) {
-  Finding out{.check = kStillCheck};
   const std::size_t tip = rest.body.size() - 1;
   double sum = 0.0, count = 0.0;
   for (const SeenFrame& frame : seen.frames) {
@@ -120,14 +119,13 @@ Finding check_still(const Experiment& experiment, const Observation& seen, const
     count += 1.0;
   }
   const double part = std::sqrt(sum / count) / extent_of(experiment.arm, rest).measured_m;
-  out.text = fmt::format("the end moves by {:.2g} % of the arm's length rms", 100.0 * part);
-  out.verdict = part <= kStill ? Verdict::pass : Verdict::fail;
-  if (out.verdict == Verdict::fail)
-    out.fix =
-        "wait until the arm hangs still, softarm disarm if a daemon moves it; or the camera "
-        "confuses "
-        "two bodies: make their markers differ";
-  return out;
+  const std::string text =
+      fmt::format("the end moves by {:.2g} % of the arm's length rms", 100.0 * part);
+  if (part <= kStill) return Finding::passed(kStillCheck, text);
+  return Finding::failed(
+      kStillCheck, text,
+      "wait until the arm hangs still, softarm disarm if a daemon moves it; or the camera confuses "
+      "two bodies: make their markers differ");
 }
 
 Finding check_units(const Experiment& experiment, const MeanPoses& rest) {
@@ -138,20 +136,19 @@ Finding check_units(const Experiment& experiment, const MeanPoses& rest) {
   static constexpr std::array kFactors{Unit{"millimetres", 1e3},     Unit{"centimetres", 1e2},
                                        Unit{"inches", 1.0 / 0.0254}, Unit{"feet", 1.0 / 0.3048},
                                        Unit{"kilometres", 1e-3},     Unit{"units of 0.1 km", 1e-2}};
-  Finding out{.check = kUnits};
   const Extent extent = extent_of(experiment.arm, rest);
   const double ratio = extent.measured_m / extent.configured_m;
-  out.text = fmt::format("the outermost bodies are {:.4g} m apart, {:.4g} m configured",
-                         extent.measured_m, extent.configured_m);
-  if (ratio < kPlausibleExtent && ratio > 1.0 / kPlausibleExtent) {
-    out.verdict = Verdict::pass;
-    return out;
-  }
-  out.verdict = Verdict::fail;
+  const std::string text =
+      fmt::format("the outermost bodies are {:.4g} m apart, {:.4g} m configured", extent.measured_m,
+                  extent.configured_m);
+  if (ratio < kPlausibleExtent && ratio > 1.0 / kPlausibleExtent)
+    return Finding::passed(kUnits, text);
   const bool configured_mm = experiment.transport.mocap.unit == LengthUnit::millimetre;
-  out.fix = fmt::format(
-      "the sender's unit of length (daemon.mocap.unit is {}), and arm.length_m in metres",
-      configured_mm ? "mm" : "m");
+  Finding out = Finding::failed(
+      kUnits, text,
+      fmt::format(
+          "the sender's unit of length (daemon.mocap.unit is {}), and arm.length_m in metres",
+          configured_mm ? "mm" : "m"));
   for (const Unit& unit : kFactors)
     if (std::abs(ratio / unit.factor - 1.0) < kUnitSlack) {
       if (unit.factor == 1e3 && !configured_mm) out.fix = "daemon.mocap.unit: mm";
@@ -165,38 +162,31 @@ Finding check_units(const Experiment& experiment, const MeanPoses& rest) {
 }
 
 Finding check_order(const Experiment& experiment, const MeanPoses& rest) {
-  Finding out{.check = kOrder};
   const std::vector<std::size_t> configured = seen_bodies(rest);
-  if (configured.size() < 3) {
-    out.text = "fewer than three bodies seen";
-    return out;
-  }
+  if (configured.size() < 3) return Finding::not_checked(kOrder, "fewer than three bodies seen");
   const AlongLine line = along_line(rest, extent_of(experiment.arm, rest));
-  if (line.beside > kStraight) {
-    out.text = fmt::format("the arm is too curved, {:.0f} % of its length beside a line",
-                           100.0 * line.beside);
-    return out;
-  }
-  if (line.order == configured) {
-    out.verdict = Verdict::pass;
-    out.text = "bodies follow one another from base to tip as configured";
-    return out;
-  }
-  out.verdict = Verdict::fail;
+  if (line.beside > kStraight)
+    return Finding::not_checked(
+        kOrder, fmt::format("the arm is too curved, {:.0f} % of its length beside a line",
+                            100.0 * line.beside));
+  if (line.order == configured)
+    return Finding::passed(kOrder, "bodies follow one another from base to tip as configured");
   std::vector<std::string> found, wrong;
   for (std::size_t k = 0; k < configured.size(); ++k) {
     found.push_back(place(line.order[k]));
     if (line.order[k] != configured[k]) wrong.push_back(place(configured[k]));
   }
-  out.text = wrong.size() == 2 ? fmt::format("{} and {} are exchanged", wrong[0], wrong[1])
-                               : fmt::format("along the arm come: {}", fmt::join(found, ", "));
+  Finding out = Finding::failed(kOrder,
+                                wrong.size() == 2
+                                    ? fmt::format("{} and {} are exchanged", wrong[0], wrong[1])
+                                    : fmt::format("along the arm come: {}", fmt::join(found, ", ")),
+                                "exchange them in daemon.bodies or in the motion capture");
   const BodySettings& bodies = experiment.transport.bodies;
   const auto id = [&](std::size_t body) {
     return body == 0 ? bodies.base_id : bodies.segment_ids[body - 1];
   };
   std::vector<int> ids;
   for (const std::size_t body : line.order) ids.push_back(id(body));
-  out.fix = "exchange them in daemon.bodies or in the motion capture";
   if (ids.size() == rest.body.size() && bodies.base_id >= 0 &&
       !experiment.transport.mocap.source.named())
     out.fix = fmt::format("daemon.bodies: {{base_id: {}, segment_ids: [{}]}}", ids.front(),
@@ -205,35 +195,28 @@ Finding check_order(const Experiment& experiment, const MeanPoses& rest) {
 }
 
 Finding check_world_axes(const Experiment& experiment, const MeanPoses& rest) {
-  Finding out{.check = kWorldAxes};
   const ArmParameters& arm = experiment.arm;
-  if (!rest.body.front().valid || !rest.body.back().valid) {
-    out.text = "base or tip not seen";
-    return out;
-  }
+  if (!rest.body.front().valid || !rest.body.back().valid)
+    return Finding::not_checked(kWorldAxes, "base or tip not seen");
   const Eigen::Vector3d expected = arm.base_rotation.col(2);
   const Eigen::Vector3d measured =
       (rest.body.back().position_m - rest.body.front().position_m).normalized();
   const double off_rad = std::atan2(measured.cross(expected).norm(), measured.dot(expected));
   const bool upright = arm.gravity_mps2.norm() == 0.0 ||
                        std::abs(expected.dot(arm.gravity_mps2.normalized())) > kUpright;
-  out.text = fmt::format("from base to tip the arm points along {} of the motion capture's world",
-                         nearest_axis(measured));
-  if (off_rad < (upright ? kWorldAxes_rad : kSagging_rad)) {
-    out.verdict = Verdict::pass;
-    return out;
-  }
-  out.verdict = Verdict::fail;
-  out.text += fmt::format(", by arm.base it should be {}, {:.2f} rad away", nearest_axis(expected),
-                          off_rad);
-  out.fix =
+  const std::string text =
+      fmt::format("from base to tip the arm points along {} of the motion capture's world",
+                  nearest_axis(measured));
+  if (off_rad < (upright ? kWorldAxes_rad : kSagging_rad)) return Finding::passed(kWorldAxes, text);
+  return Finding::failed(
+      kWorldAxes,
+      fmt::format("{}, by arm.base it should be {}, {:.2f} rad away", text, nearest_axis(expected),
+                  off_rad),
       "daemon.mocap.axes (many systems have y up: y_up), or arm.base.rotation; or base and tip are "
-      "exchanged in daemon.bodies";
-  return out;
+      "exchanged in daemon.bodies");
 }
 
 Finding check_lengths(const Experiment& experiment, const MeanPoses& rest, bool curved) {
-  Finding out{.check = "lengths", .verdict = Verdict::pass};
   std::vector<std::string> wrong;
   std::vector<double> all_m;
   double worst = 0.0;
@@ -254,14 +237,13 @@ Finding check_lengths(const Experiment& experiment, const MeanPoses& rest, bool 
       wrong.push_back(fmt::format("segment {} is {:.4f} m long, {:.4f} m configured", i + 1,
                                   length_m, configured_m));
   }
-  out.text = fmt::format("segments are as long as configured within {:.1f} %", 100.0 * worst);
-  if (!wrong.empty()) {
-    out.verdict = Verdict::fail;
-    out.text = fmt::format("{}", fmt::join(wrong, "; "));
-    out.fix =
-        fmt::format("measure from body to body: arm.length_m: [{:.4g}]", fmt::join(all_m, ", "));
-  }
-  return out;
+  if (wrong.empty())
+    return Finding::passed(
+        "lengths",
+        fmt::format("segments are as long as configured within {:.1f} %", 100.0 * worst));
+  return Finding::failed(
+      "lengths", fmt::format("{}", fmt::join(wrong, "; ")),
+      fmt::format("measure from body to body: arm.length_m: [{:.4g}]", fmt::join(all_m, ", ")));
 }
 
 }  // namespace softarm

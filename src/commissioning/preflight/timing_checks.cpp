@@ -39,27 +39,23 @@ std::string body_name(std::size_t index, const TransportSettings& transport) {
                      index == 0 ? bodies.base_id : bodies.segment_ids[index - 1]);
 }
 
-std::string id_list(const std::vector<int>& ids) { return fmt::format("{}", fmt::join(ids, ", ")); }
-
 Finding check_bodies(const Experiment& experiment, const Observation& seen) {
-  Finding out{.check = kBodies};
   const LcmSettings& lcm = experiment.transport.lcm;
   const bool has_server = experiment.transport.mocap.source.network.has_value();
   const std::string channels = has_server ? mocap_place(experiment.transport)
                                           : fmt::format("{}", fmt::join(seen.channels, ", "));
   const double listened_s = to_seconds(seen.rest_end_ns - seen.start_ns);
-  if (seen.frames.empty()) {
-    out.verdict = Verdict::fail;
-    out.text = fmt::format("no frame on {} within {:.1f} s", channels, listened_s);
-    if (seen.not_frames > 0)
-      out.text += fmt::format(", but {} packets that are not frames", seen.not_frames);
-    out.fix = has_server ? "start the server and its streaming of rigid bodies, or fix daemon.mocap"
-                         : fmt::format(
-                               "start the sender of frames, or fix daemon.mocap.source; it must "
-                               "publish on {} at {}",
-                               channels, lcm.url);
-    return out;
-  }
+  if (seen.frames.empty())
+    return Finding::failed(
+        kBodies,
+        fmt::format("no frame on {} within {:.1f} s{}", channels, listened_s,
+                    seen.not_frames > 0
+                        ? fmt::format(", but {} packets that are not frames", seen.not_frames)
+                        : ""),
+        has_server ? "start the server and its streaming of rigid bodies, or fix daemon.mocap"
+                   : fmt::format("start the sender of frames, or fix daemon.mocap.source; it must "
+                                 "publish on {} at {}",
+                                 channels, lcm.url));
   const auto count = static_cast<int>(seen.frames.front().body.size());
   const MeanPoses mean = mean_poses(seen, seen.start_ns, kForever, count);
   std::vector<std::string> missing;
@@ -69,20 +65,16 @@ Finding check_bodies(const Experiment& experiment, const Observation& seen) {
                                             : fmt::format("{} seen in {:.1f} % of the frames",
                                                           body_name(i, experiment.transport),
                                                           100.0 * mean.seen[i]));
-  out.text = fmt::format("{} frames in {:.1f} s on {}", seen.frames.size(),
-                         to_seconds(seen.frames.back().arrival_ns - seen.start_ns), channels);
-  if (missing.empty()) {
-    out.verdict = Verdict::pass;
-    out.text += fmt::format(", all {} bodies seen", count);
-    return out;
-  }
-  out.verdict = Verdict::fail;
-  out.text += fmt::format(": {}", fmt::join(missing, ", "));
-  out.fix = seen.other_ids.empty()
-                ? "markers hidden, too few or not tracked"
-                : fmt::format("daemon.bodies does not name ids {}, which are there",
-                              id_list(seen.other_ids));
-  return out;
+  const std::string text =
+      fmt::format("{} frames in {:.1f} s on {}", seen.frames.size(),
+                  to_seconds(seen.frames.back().arrival_ns - seen.start_ns), channels);
+  if (missing.empty())
+    return Finding::passed(kBodies, fmt::format("{}, all {} bodies seen", text, count));
+  return Finding::failed(kBodies, fmt::format("{}: {}", text, fmt::join(missing, ", ")),
+                         seen.other_ids.empty()
+                             ? "markers hidden, too few or not tracked"
+                             : fmt::format("daemon.bodies does not name ids {}, which are there",
+                                           fmt::join(seen.other_ids, ", ")));
 }
 
 /// Time stamps that advance: the sender's, else the arrivals.
@@ -113,7 +105,6 @@ Times times_of(const Observation& seen) {
 }
 
 Finding check_rate(const Experiment& experiment, const Times& times) {
-  Finding out{.check = "rate"};
   std::vector<double> periods_s;
   for (std::size_t k = 1; k < times.s.size(); ++k)
     periods_s.push_back((times.s[k] - times.s[k - 1]) /
@@ -122,25 +113,21 @@ Finding check_rate(const Experiment& experiment, const Times& times) {
   const double configured_s = experiment.safety.frame_period_s;
   const auto sent = static_cast<double>(times.number.back() - times.number.front() + 1);
   const double missing = 1.0 - static_cast<double>(times.number.size()) / sent;
-  out.text = fmt::format("{:.1f} Hz{}, {:.1f} Hz configured; {:.1f} % of the frames missing",
-                         1.0 / period_s, times.stamped ? "" : " by arrival", 1.0 / configured_s,
-                         100.0 * missing);
-  if (std::abs(period_s / configured_s - 1.0) > kRateTolerance) {
-    out.verdict = Verdict::fail;
-    out.fix = fmt::format("daemon.safety.frame_period_s: {:.4g}, or the camera's rate", period_s);
-  } else if (missing > kMissingTolerance) {
-    out.verdict = Verdict::fail;
-    out.fix =
-        "a separate wired network between camera host and this machine; a receive buffer "
-        "that holds the frames";
-  } else {
-    out.verdict = Verdict::pass;
-  }
-  return out;
+  const std::string text = fmt::format(
+      "{:.1f} Hz{}, {:.1f} Hz configured; {:.1f} % of the frames missing", 1.0 / period_s,
+      times.stamped ? "" : " by arrival", 1.0 / configured_s, 100.0 * missing);
+  if (std::abs(period_s / configured_s - 1.0) > kRateTolerance)
+    return Finding::failed(
+        "rate", text,
+        fmt::format("daemon.safety.frame_period_s: {:.4g}, or the camera's rate", period_s));
+  if (missing > kMissingTolerance)
+    return Finding::failed("rate", text,
+                           "a separate wired network between camera host and this machine; a "
+                           "receive buffer that holds the frames");
+  return Finding::passed("rate", text);
 }
 
 Finding check_jitter(const Experiment& experiment, const Times& times) {
-  Finding out{.check = "jitter"};
   const SafetySettings& safety = experiment.safety;
   const double hold_s =
       to_seconds(resolve_thresholds(safety, 1.0 / experiment.rate_hz).hold_after_ns);
@@ -155,17 +142,13 @@ Finding check_jitter(const Experiment& experiment, const Times& times) {
     longest_s = std::max(longest_s, gap_s);
     late += gap_s + safety.frame_latency_s > hold_s ? 1 : 0;
   }
-  out.text = fmt::format("frames arrive at most {:.1f} ms apart", 1e3 * longest_s);
-  if (times.stamped)
-    out.text += fmt::format(", with a jitter of {:.1f} ms", 1e3 * (most_s - least_s));
-  out.text += fmt::format("; HOLD after {:.1f} ms", 1e3 * hold_s);
-  out.verdict = late > 0 ? Verdict::fail : Verdict::pass;
-  if (late > 0) {
-    out.text += fmt::format(", which would have occurred {} times", late);
-    out.fix =
-        "reduce the load on the network and this machine, or raise daemon.safety.hold_after_s";
-  }
-  return out;
+  std::string text = fmt::format("frames arrive at most {:.1f} ms apart", 1e3 * longest_s);
+  if (times.stamped) text += fmt::format(", with a jitter of {:.1f} ms", 1e3 * (most_s - least_s));
+  text += fmt::format("; HOLD after {:.1f} ms", 1e3 * hold_s);
+  if (late == 0) return Finding::passed("jitter", text);
+  return Finding::failed(
+      "jitter", fmt::format("{}, which would have occurred {} times", text, late),
+      "reduce the load on the network and this machine, or raise daemon.safety.hold_after_s");
 }
 
 /// Shortest time from stamp to arrival, if the stamps are from one of our clocks.
@@ -184,40 +167,29 @@ std::optional<double> least_latency_s(const Observation& seen, std::string& cloc
 }
 
 Finding check_latency(const Experiment& experiment, const Observation& seen, const Times& times) {
-  Finding out{.check = "latency"};
+  const char* check = "latency";
   const double declared_s = experiment.safety.frame_latency_s;
-  if (!times.stamped) {
-    if (experiment.transport.capture_time == ClockMode::latency) {
-      out.text =
-          fmt::format("frames carry no advancing time; {:.1f} ms declared", 1e3 * declared_s);
-      return out;
-    }
-    out.verdict = Verdict::fail;
-    out.text = "the sender's time stamps do not advance";
-    out.fix = "stamp every frame at exposure, or daemon.capture_time: latency";
-    return out;
-  }
+  if (!times.stamped && experiment.transport.capture_time == ClockMode::latency)
+    return Finding::not_checked(
+        check, fmt::format("frames carry no advancing time; {:.1f} ms declared", 1e3 * declared_s));
+  if (!times.stamped)
+    return Finding::failed(check, "the sender's time stamps do not advance",
+                           "stamp every frame at exposure, or daemon.capture_time: latency");
   std::string clock;
   const std::optional<double> least_s = least_latency_s(seen, clock);
-  if (!least_s) {
-    out.text = fmt::format(
-        "the sender's clock is not one of ours, so only changes of latency show (see jitter); "
-        "{:.1f} "
-        "ms declared",
-        1e3 * declared_s);
-    return out;
-  }
-  out.text = fmt::format("at least {:.1f} ms by our {}, {:.1f} ms declared", 1e3 * *least_s, clock,
-                         1e3 * declared_s);
-  out.verdict = Verdict::pass;
-  if (std::abs(*least_s - declared_s) > std::max(kLatencyTolerance_s, 0.25 * declared_s)) {
-    out.verdict = Verdict::fail;
-    out.fix = fmt::format(
-        "daemon.safety.frame_latency_s: {:.4f}, unless stamps are not taken at "
-        "exposure",
-        std::max(0.0, *least_s));
-  }
-  return out;
+  if (!least_s)
+    return Finding::not_checked(
+        check, fmt::format("the sender's clock is not one of ours, so only changes of latency show "
+                           "(see jitter); {:.1f} ms declared",
+                           1e3 * declared_s));
+  const std::string text = fmt::format("at least {:.1f} ms by our {}, {:.1f} ms declared",
+                                       1e3 * *least_s, clock, 1e3 * declared_s);
+  if (std::abs(*least_s - declared_s) <= std::max(kLatencyTolerance_s, 0.25 * declared_s))
+    return Finding::passed(check, text);
+  return Finding::failed(
+      check, text,
+      fmt::format("daemon.safety.frame_latency_s: {:.4f}, unless stamps are not taken at exposure",
+                  std::max(0.0, *least_s)));
 }
 
 }  // namespace
@@ -227,7 +199,7 @@ std::vector<Finding> check_timing(const Experiment& experiment, const Observatio
   const Times times = times_of(seen);
   if (times.s.size() < 10) {
     for (const char* check : {"rate", "jitter", "latency"})
-      out.push_back({check, Verdict::not_checked, "fewer than 10 frames", ""});
+      out.push_back(Finding::not_checked(check, "fewer than 10 frames"));
     return out;
   }
   out.push_back(check_rate(experiment, times));

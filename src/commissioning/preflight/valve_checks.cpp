@@ -42,49 +42,39 @@ std::vector<double> mean_bar(const Observation& seen, std::int64_t from_ns, std:
 }
 
 Finding check_pressures(const Experiment& experiment, const Observation& seen) {
-  Finding out{.check = "pressures"};
-  const LcmSettings& lcm = experiment.transport.lcm;
+  const char* check = "pressures";
   if (seen.pressures.empty()) {
-    out.text = fmt::format("no measured pressures on {}", lcm.measurement_channel);
-    if (experiment.safety.valve_readback) {
-      out.verdict = Verdict::fail;
-      out.fix =
-          "start softarm-valves; the daemon goes to FAULT without them "
-          "(daemon.safety.valve_readback)";
-    }
-    return out;
+    const std::string text =
+        fmt::format("no measured pressures on {}", experiment.transport.lcm.measurement_channel);
+    if (!experiment.safety.valve_readback) return Finding::not_checked(check, text);
+    return Finding::failed(check, text,
+                           "start softarm-valves; the daemon goes to FAULT without them "
+                           "(daemon.safety.valve_readback)");
   }
   const int chambers = chamber_count(experiment.actuation);
-  const auto wrong =
-      std::find_if(seen.pressures.begin(), seen.pressures.end(), [&](const SeenPressures& each) {
-        return each.bar.size() != static_cast<std::size_t>(chambers);
-      });
-  if (wrong != seen.pressures.end()) {
-    out.verdict = Verdict::fail;
-    out.text = fmt::format("{} pressures are measured, {} chambers configured", wrong->bar.size(),
-                           chambers);
-    out.fix = "actuation.chambers of this arm, and the configuration softarm-valves was given";
-    return out;
-  }
+  for (const SeenPressures& each : seen.pressures)
+    if (each.bar.size() != static_cast<std::size_t>(chambers))
+      return Finding::failed(
+          check,
+          fmt::format("{} pressures are measured, {} chambers configured", each.bar.size(),
+                      chambers),
+          "actuation.chambers of this arm, and the configuration softarm-valves was given");
   // Pressure from before must vent first.
   const std::vector<double> rest =
       mean_bar(seen, seen.start_ns + kSettled_ns, seen.rest_end_ns, chambers);
-  if (rest.empty() || seen.commanded_by_others) {
-    out.text =
-        rest.empty() ? "none measured while the arm rested" : "another program commands pressures";
-    return out;
-  }
+  if (rest.empty()) return Finding::not_checked(check, "none measured while the arm rested");
+  if (seen.commanded_by_others)
+    return Finding::not_checked(check, "another program commands pressures");
   const auto most = std::max_element(rest.begin(), rest.end(),
                                      [](double a, double b) { return std::abs(a) < std::abs(b); });
-  const int valve = static_cast<int>(most - rest.begin());
-  out.verdict = std::abs(*most) <= kAtRest_bar ? Verdict::pass : Verdict::fail;
-  out.text = fmt::format("{} chambers, vented they show {:.3f} bar at most", chambers, *most);
-  if (out.verdict == Verdict::fail) {
-    out.text = fmt::format("{} shows {:.3f} bar, expected 0 bar: nothing is commanded",
-                           valve_name(experiment, valve), *most);
-    out.fix = "a valve that does not close, or a sensor's zero";
-  }
-  return out;
+  if (std::abs(*most) <= kAtRest_bar)
+    return Finding::passed(
+        check, fmt::format("{} chambers, vented they show {:.3f} bar at most", chambers, *most));
+  return Finding::failed(
+      check,
+      fmt::format("{} shows {:.3f} bar, expected 0 bar: nothing is commanded",
+                  valve_name(experiment, static_cast<int>(most - rest.begin())), *most),
+      "a valve that does not close, or a sensor's zero");
 }
 
 /// What is wrong with the pressures of one pulse; empty if nothing is. Sets `measured` to false if
@@ -118,7 +108,6 @@ std::vector<std::string> leaks_of(const Experiment& experiment, const Observatio
 }
 
 Finding check_leaks(const Experiment& experiment, const Observation& seen) {
-  Finding out{.check = "leaks"};
   std::vector<std::string> problems;
   std::size_t looked_at = 0;
   for (const Pulse& pulse : seen.pulses) {
@@ -127,23 +116,19 @@ Finding check_leaks(const Experiment& experiment, const Observation& seen) {
       problems.push_back(std::move(problem));
     looked_at += measured ? 1 : 0;
   }
-  if (looked_at == 0) {
-    out.text = seen.pulses.empty() ? "no chamber was filled; --pulse does, and moves the arm"
-                                   : "no pressures are measured";
-    return out;
-  }
-  const auto chambers = static_cast<std::size_t>(chamber_count(experiment.actuation));
-  const Verdict holds = looked_at == chambers ? Verdict::pass : Verdict::not_checked;
-  out.verdict = problems.empty() ? holds : Verdict::fail;
-  out.text = problems.empty()
-                 ? fmt::format("{} of {} chambers hold what is commanded within {:.0f} %",
-                               looked_at, chambers, 100.0 * kShort)
-                 : fmt::format("{}", fmt::join(problems, "; "));
+  if (looked_at == 0)
+    return Finding::not_checked(
+        "leaks", seen.pulses.empty() ? "no chamber was filled; --pulse does, and moves the arm"
+                                     : "no pressures are measured");
   if (!problems.empty())
-    out.fix =
-        "look for a leak, a burst or pinched tube, a weak supply; or sensors on other tubes "
-        "than their valves";
-  return out;
+    return Finding::failed("leaks", fmt::format("{}", fmt::join(problems, "; ")),
+                           "look for a leak, a burst or pinched tube, a weak supply; or sensors on "
+                           "other tubes than their valves");
+  const auto chambers = static_cast<std::size_t>(chamber_count(experiment.actuation));
+  const std::string text = fmt::format("{} of {} chambers hold what is commanded within {:.0f} %",
+                                       looked_at, chambers, 100.0 * kShort);
+  return looked_at == chambers ? Finding::passed("leaks", text)
+                               : Finding::not_checked("leaks", text);
 }
 
 }  // namespace
@@ -155,9 +140,8 @@ std::vector<Finding> check_valves(const Experiment& experiment, const Observatio
   const bool readable = !failed(geometry, kUnits) && !failed(geometry, kOrder) &&
                         !failed(geometry, kQuaternions) && !failed(geometry, "handedness") &&
                         !failed(geometry, kStillCheck);
-  out.push_back(
-      readable ? check_valve_map(experiment, seen)
-               : Finding{"valve map", Verdict::not_checked, "fix what failed above first", ""});
+  out.push_back(readable ? check_valve_map(experiment, seen)
+                         : Finding::not_checked("valve map", "fix what failed above first"));
   out.push_back(check_leaks(experiment, seen));
   return out;
 }

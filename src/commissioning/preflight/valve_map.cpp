@@ -151,47 +151,40 @@ std::optional<PulseResponse> response_to(const Experiment& experiment, const Obs
 }
 
 Finding check_valve_map(const Experiment& experiment, const Observation& seen) {
-  Finding out{.check = "valve map"};
-  if (seen.pulses.empty()) {
-    out.text = "no chamber was filled; --pulse does, and moves the arm";
-    return out;
-  }
+  const char* check = "valve map";
+  if (seen.pulses.empty())
+    return Finding::not_checked(check, "no chamber was filled; --pulse does, and moves the arm");
   Responses responses;
   std::vector<std::string> problems;
   for (const Pulse& pulse : seen.pulses) {
     const auto response = response_to(experiment, seen, pulse);
-    if (!response) {
+    if (response)
+      responses.push_back(*response);
+    else
       problems.push_back("not every segment was seen while " +
                          chamber_name(pulse.segment, pulse.chamber) + " was filled");
-      continue;
-    }
-    responses.push_back(*response);
   }
-  if (const std::string cause = problems.empty() ? common_cause(responses, out.fix) : "";
-      !cause.empty()) {
-    out.verdict = Verdict::fail;
-    out.text = cause;
-    return out;
-  }
+  std::string fix;
+  if (const std::string cause = problems.empty() ? common_cause(responses, fix) : "";
+      !cause.empty())
+    return Finding::failed(check, cause, fix);
   for (const PulseResponse& each : responses)
     if (std::string problem = one_problem(experiment, each); !problem.empty())
       problems.push_back(std::move(problem));
-  if (problems.empty()) {
-    const auto chambers = static_cast<std::size_t>(chamber_count(experiment.actuation));
-    out.verdict = responses.size() == chambers ? Verdict::pass : Verdict::not_checked;
-    out.text = strength_text(responses);
-    if (responses.size() < chambers)
-      out.text += fmt::format("; {} were not filled", chambers - responses.size());
-    return out;
+  if (!problems.empty()) {
+    const std::vector<int> order = corrected_order(experiment, responses);
+    return Finding::failed(
+        check, fmt::format("{}", fmt::join(problems, "; ")),
+        order.empty() || order == experiment.valves.order
+            ? "tubes, valves.order and actuation.chambers (angle_rad, gain_nm_per_bar)"
+            : fmt::format("exchange the tubes, or valves.order: [{}] for softarm-valves",
+                          fmt::join(order, ", ")));
   }
-  out.verdict = Verdict::fail;
-  out.text = fmt::format("{}", fmt::join(problems, "; "));
-  const std::vector<int> order = corrected_order(experiment, responses);
-  out.fix = order.empty() || order == experiment.valves.order
-                ? "tubes, valves.order and actuation.chambers (angle_rad, gain_nm_per_bar)"
-                : fmt::format("exchange the tubes, or valves.order: [{}] for softarm-valves",
-                              fmt::join(order, ", "));
-  return out;
+  const auto chambers = static_cast<std::size_t>(chamber_count(experiment.actuation));
+  const std::string text = strength_text(responses);
+  if (responses.size() == chambers) return Finding::passed(check, text);
+  return Finding::not_checked(
+      check, fmt::format("{}; {} were not filled", text, chambers - responses.size()));
 }
 
 }  // namespace softarm

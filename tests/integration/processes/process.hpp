@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "dev/child_process.hpp"
+#include "apps/child_process.hpp"
 
 namespace softarm::test {
 

@@ -113,6 +113,16 @@ TEST_F(Outputs, EveryCommandReportsThatItsOutputIsLost) {
   }
 }
 
+TEST_F(Outputs, ATableOfRunsReportsASummaryThatCannotBeRead) {
+  fs::create_directories(folder_ / "runs/damaged");
+  std::ofstream(path("runs/damaged/summary.json")) << "not JSON";
+  const test::Outcome outcome = test::run("report " + path("runs"));
+  EXPECT_EQ(outcome.code, 1) << outcome.text;
+  EXPECT_NE(outcome.text.find("damaged/summary.json: expected the summary of a run"),
+            std::string::npos)
+      << outcome.text;
+}
+
 TEST_F(Outputs, AFullDiskKeepsWhatWasRecordedAndItsSummary) {
   const std::string command =
       "bash -c 'ulimit -f 200; exec " SOFTARM_BINARY_DIR "/bin/softarm run " + path("arm.yaml") +

@@ -145,6 +145,8 @@ const Mistake kMistakes[] = {
     {"  mass_kg: 0.15", "   mass_kg: 0.15", "arm", "the same column"},
     {"mass_kg: 0.15", "mass_kg: 0.15\n  mass_kg: 0.2", "arm.mass_kg", "the first is in line"},
     {"run:\n  duration_s: 20", "run: 20", "run", "a section"},
+    {"    points:", "    duration_s: 5\n    points:", "reference[1].duration_s",
+     "nothing: the last phase does not end"},
     {"name: good", "name: Gr\xf6\x62li", "name", "save the file as UTF-8"},
     {"seed: 7", "include: not_there.yaml", "include", "an existing file, relative to this one"},
     {"seed: 7", "include: wrong.yaml", "include", "a file that does not include this one again"},

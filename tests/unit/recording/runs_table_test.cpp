@@ -35,7 +35,9 @@ TEST_F(RunsTable, HasALineForEveryRun) {
                            {"t_s":5.8,"mode":"VENT","reason":"disarmed"}]})");
   write("a", R"({"duration_s":2.0,"tracking":{"u_rms_rad":null},"torque_nm":{"max":1.5}})");
   write("c", "not JSON");
-  std::istringstream lines(runs_table(folder_.path()));
+  const auto table = runs_table(folder_.path());
+  EXPECT_EQ(table.unreadable, Files{folder_.path() / "c" / "summary.json"});
+  std::istringstream lines(table.text);
   std::string head, a, b, c;
   ASSERT_TRUE(std::getline(lines, head) && std::getline(lines, a) && std::getline(lines, b) &&
               std::getline(lines, c));

@@ -40,14 +40,14 @@ class StampedPackets : public ::testing::Test {
     }
     wall_minus_ns_ += step_ns;
     now_ns_ = until_ns;
-    clock_.look(now_ns_, now_ns_ + wall_minus_ns_);
+    clock_.look({now_ns_, now_ns_ + wall_minus_ns_});
     return packets;
   }
 
   std::mt19937 random_{5};
   std::int64_t now_ns_ = 10 * kSecond, next_ns_ = now_ns_;
   std::int64_t wall_minus_ns_ = kDate_ns;
-  ArrivalClock clock_{now_ns_, now_ns_ + wall_minus_ns_};
+  ArrivalClock clock_{{now_ns_, now_ns_ + wall_minus_ns_}};
 };
 
 const std::vector<std::int64_t> kSteps{

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <utility>
 
 #include "dev/bench/interleaved.hpp"
 #include "softarm/control/curvature_controller.hpp"
@@ -30,23 +31,18 @@ std::vector<ControlRow> term_rows(const Experiment& experiment) {
     rows.push_back(row_of(what, experiment));
     rows.back().terms = terms;
   };
-  const ControlTerms all = experiment.control.terms;
-  ControlTerms terms = all;
-  add("all of (17)", all);
-  terms.inertia = false;
-  add("without B u''_ref", terms);
-  terms = all;
-  terms.coriolis = false;
-  add("without C u'_ref", terms);
-  terms = all;
-  terms.gravity = false;
-  add("without G", terms);
-  terms = all;
-  terms.stiffness = false;
-  add("without K u_ref", terms);
-  terms = all;
-  terms.damping = false;
-  add("without D u'_ref", terms);
+  add("all of (17)", experiment.control.terms);
+  const std::pair<const char*, bool ControlTerms::*> left_out[] = {
+      {"without B u''_ref", &ControlTerms::inertia},
+      {"without C u'_ref", &ControlTerms::coriolis},
+      {"without G", &ControlTerms::gravity},
+      {"without K u_ref", &ControlTerms::stiffness},
+      {"without D u'_ref", &ControlTerms::damping}};
+  for (const auto& [what, term] : left_out) {
+    ControlTerms terms = experiment.control.terms;
+    terms.*term = false;
+    add(what, terms);
+  }
   add("K_P and K_D alone", {false, false, false, false, false});
   return rows;
 }

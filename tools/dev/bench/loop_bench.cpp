@@ -20,8 +20,9 @@
 #include <stdexcept>
 #include <thread>
 
+#include "apps/child_process.hpp"
 #include "dev/bench/loop_peers.hpp"
-#include "dev/child_process.hpp"
+#include "dev/bench/temporary_folder.hpp"
 #include "softarm/base/clock.hpp"
 #include "softarm/base/realtime.hpp"
 #include "softarm/base/time.hpp"
@@ -68,36 +69,28 @@ double stolen_s() {
 class Scene {
  public:
   Scene(const LoopBenchOptions& options, LoopScene& result)
-      : options_(options),
-        result_(result),
-        period_ns_(to_ns(1.0 / options.rate_hz)),
-        folder_(std::filesystem::temp_directory_path() /
-                fmt::format("softarm_bench_loop_{}", getpid())) {
-    std::filesystem::create_directories(folder_);
+      : options_(options), result_(result), period_ns_(to_ns(1.0 / options.rate_hz)) {
     const int second_ticks = static_cast<int>(options.rate_hz);  // the longest allowed
-    setenv("XDG_STATE_HOME", folder_.c_str(), 1);                // of the daemon
-    std::ofstream(folder_ / "loop.yaml") << fmt::format(
+    setenv("XDG_STATE_HOME", folder_.path().c_str(), 1);         // of the daemon
+    std::ofstream(config()) << fmt::format(
         "include: {}\nname: bench_loop\nreference: [{{kind: set_point, theta_rad: {}}}]\n{}"
         "daemon:\n  rate_hz: {}\n  capture_time: latency\n"
-        "  lcm: {{url: \"udpm://239.255.76.67:{}?ttl=0\"}}\n"
+        "  lcm: {{url: \"{}\"}}\n"
         "  safety: {{arming: automatic, frame_period_s: {}, frame_latency_s: 0, hold_after_s: "
         "1,\n"
         "    vent_after_s: 2, hold_overruns: {}, vent_overruns: {}, valve_readback: "
         "false}}\n"
         "  realtime: {{fifo: {}, priority: {}, cpu: {}}}\n",
         std::filesystem::absolute(options.config).string(), kTheta_rad,
-        options.law ? "control: {law: external}\n" : "", options.rate_hz, 20000 + getpid() % 12000,
+        options.law ? "control: {law: external}\n" : "", options.rate_hz, own_network(),
         1.0 / options.rate_hz, second_ticks - 1, second_ticks, result.fifo, kPriority,
         options.cpu < 0 ? "any" : std::to_string(options.cpu));
-    experiment_ = load_experiment(folder_ / "loop.yaml");
+    experiment_ = load_experiment(config());
     if (experiment_.transport.mocap.source != softarm_mocap())
       throw ConfigError(options.config, 0, "daemon.mocap.source",
                         "softarm, whose frames this bench sends", "another source");
     make_frames();
   }
-  ~Scene() { std::filesystem::remove_all(folder_); }
-  Scene(const Scene&) = delete;
-  Scene& operator=(const Scene&) = delete;
 
   void run(const std::function<void(const std::string&)>& progress);
   int frame_bytes() const { return frames_[0].getEncodedSize(); }
@@ -110,6 +103,7 @@ class Scene {
     std::vector<std::pair<std::int64_t, std::int64_t>> frames;  ///< number, arrival in ns
   };
 
+  std::filesystem::path config() const { return folder_.path() / "loop.yaml"; }
   void make_frames();
   void listen();
   void drive(double seconds, const std::function<void(const std::string&)>& progress);
@@ -128,7 +122,7 @@ class Scene {
   LoopBenchOptions options_;
   LoopScene& result_;
   std::int64_t period_ns_;
-  std::filesystem::path folder_;
+  TemporaryFolder folder_;
   Experiment experiment_;
   std::array<softarm_messages::mocap_frame_t, 2> frames_;
   std::unique_ptr<LcmNode> node_;
@@ -310,8 +304,8 @@ void Scene::run(const std::function<void(const std::string&)>& progress) {
   std::unique_ptr<ForkedPeer> law;
   if (options_.law)
     law = std::make_unique<ForkedPeer>([&] { answer_states_forever(experiment_, realtime); });
-  ChildProcess daemon(program_beside_this("softarmd"), {(folder_ / "loop.yaml").string()},
-                      (folder_ / "softarmd.txt").string());
+  ChildProcess daemon(program_beside_this("softarmd"), {config().string()},
+                      folder_.path() / "softarmd.txt");
   std::vector<std::unique_ptr<ForkedPeer>> load;
   for (int k = 0; k < result_.busy_processes; ++k)
     load.push_back(std::make_unique<ForkedPeer>([] {

@@ -102,23 +102,10 @@ class Kdl : public Evaluator {
 }  // namespace
 
 const char* name(Route route) noexcept {
-  switch (route) {
-    case Route::augmented:
-      return "augmented B, C, G";
-    case Route::matrices:
-      return "direct B, C, G";
-    case Route::recursion:
-      return "direct B x + C y + G";
-    case Route::controller:
-      return "controller (17)";
-    case Route::kdl_maps:
-      return "maps (6), (11) for KDL";
-    case Route::kdl_matrices:
-      return "KDL B, C q', G";
-    case Route::kdl_inverse_dynamics:
-      return "KDL B q'' + C q' + G";
-  }
-  return "";
+  constexpr const char* kNames[] = {
+      "augmented B, C, G",      "direct B, C, G", "direct B x + C y + G", "controller (17)",
+      "maps (6), (11) for KDL", "KDL B, C q', G", "KDL B q'' + C q' + G"};
+  return kNames[static_cast<std::size_t>(route)];
 }
 
 const char* coordinates(const Method& method) noexcept {

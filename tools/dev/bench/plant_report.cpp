@@ -32,15 +32,8 @@ Json json_of(const TrialReport& report) {
 }  // namespace
 
 std::string name(Scene scene) {
-  switch (scene) {
-    case Scene::free:
-      return "free";
-    case Scene::smooth:
-      return "smooth";
-    case Scene::held:
-      break;
-  }
-  return "held";
+  constexpr const char* kNames[] = {"free", "smooth", "held"};
+  return kNames[static_cast<std::size_t>(scene)];
 }
 
 std::string name(IntegratorMethod method) {

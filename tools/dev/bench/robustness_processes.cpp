@@ -1,8 +1,6 @@
 // A row of softarm-dev bench robustness over LCM: softarmd and softarm-plant as they run beside an
 // arm, and a relay between them where frames are to be lost.
-#include <fmt/format.h>
 #include <signal.h>
-#include <unistd.h>
 
 #include <chrono>
 #include <cstdlib>
@@ -13,8 +11,9 @@
 #include <stdexcept>
 #include <vector>
 
+#include "apps/child_process.hpp"
 #include "dev/bench/robustness_scenes.hpp"
-#include "dev/child_process.hpp"
+#include "dev/bench/temporary_folder.hpp"
 #include "dev/fault/fault_relay.hpp"
 #include "softarm/base/clock.hpp"
 #include "softarm/base/time.hpp"
@@ -30,26 +29,6 @@ namespace fs = std::filesystem;
 /// Until ACTIVE, and for what a busy machine may take longer.
 constexpr double kPatience_s = 30.0;
 
-/// A folder, and a port of the network, of one process.
-class Place {
- public:
-  Place() : folder_(fs::temp_directory_path() / fmt::format("softarm_robustness_{}", getpid())) {
-    fs::create_directories(folder_);
-    setenv("XDG_STATE_HOME", folder_.c_str(), 1);  // of the daemon
-  }
-  ~Place() { fs::remove_all(folder_); }
-  Place(const Place&) = delete;
-  Place& operator=(const Place&) = delete;
-
-  fs::path file(const std::string& name) const { return folder_ / name; }
-  static std::string url() {
-    return fmt::format("udpm://239.255.76.67:{}?ttl=0", 20000 + getpid() % 12000);
-  }
-
- private:
-  fs::path folder_;
-};
-
 /// What the faults of a scene do to frames now.
 Fault fault_at(const FrameFaults& faults, std::int64_t now_ns) {
   const double since_s = to_seconds(now_ns % 1'000'000'000);
@@ -62,12 +41,13 @@ Fault fault_at(const FrameFaults& faults, std::int64_t now_ns) {
 
 RobustnessTrial run_processes(const Experiment& asked, const RobustnessScene& scene,
                               std::uint64_t seed) {
-  const Place place;
+  const TemporaryFolder folder;
+  setenv("XDG_STATE_HOME", folder.path().c_str(), 1);  // of the daemon
   Experiment e = asked;
   e.seed = e.plant.seed = seed;
-  e.transport.lcm.url = Place::url();
+  e.transport.lcm.url = own_network();
   e.run.tracking_from_s = scene.counted_from_s;
-  const fs::path config = place.file("scene.yaml");
+  const fs::path config = folder.path() / "scene.yaml";
   std::ofstream(config) << resolved_text(e);
   const Experiment loaded = load_experiment(config);
 
@@ -90,9 +70,9 @@ RobustnessTrial run_processes(const Experiment& asked, const RobustnessScene& sc
     relay.emplace(lcm, kSensorSuffix);
   }
   ChildProcess plant(program_beside_this("softarm-plant"), plant_arguments,
-                     place.file("plant.txt").string());
+                     folder.path() / "plant.txt");
   ChildProcess daemon(program_beside_this("softarmd"), {config.string()},
-                      place.file("daemon.txt").string());
+                      folder.path() / "daemon.txt");
   const double until_s = scene.counted_from_s + scene.counted_s;
   const std::int64_t end_ns = monotonic_now_ns() + to_ns(until_s + kPatience_s);
   while (record.active_s() < until_s && monotonic_now_ns() < end_ns) {

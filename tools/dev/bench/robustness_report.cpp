@@ -69,17 +69,9 @@ std::string json(const std::vector<RobustnessRow>& rows, const std::vector<Obser
     Json laws = Json::array();
     for (const RobustnessCell& cell : row.cells) {
       const RobustnessTrial& trial = cell.worst;
-      laws.push_back({{"law", name(cell.law)},
-                      {"u_rms_rad", trial.u_rms_rad},
-                      {"u_largest_rad", trial.u_largest_rad},
-                      {"tip_rms_m", trial.tip_rms_m},
-                      {"e_rms_m", trial.e_rms_m},
-                      {"pressure_rate_bar_per_s", trial.pressure_rate_bar_per_s},
-                      {"tick_us", trial.tick_us},
-                      {"frame_tick_us", trial.frame_tick_us},
-                      {"nis", trial.nis},
-                      {"surprised", trial.surprised},
-                      {"stayed_active", trial.stayed_active}});
+      Json& law = laws.emplace_back(Json{{"law", name(cell.law)}});
+      for (const auto& [label, figure] : kRobustnessFigures) law[label] = trial.*figure;
+      law["stayed_active"] = trial.stayed_active;
     }
     scenes.push_back(
         {{"scene", row.scene}, {"bound_mrad", row.bound_mrad}, {"laws", std::move(laws)}});

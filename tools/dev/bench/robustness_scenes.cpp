@@ -164,21 +164,9 @@ std::vector<RobustnessScene> robustness_scenes() {
 }
 
 const char* name(RobustnessLaw law) {
-  switch (law) {
-    case RobustnessLaw::paper17:
-      return "paper17";
-    case RobustnessLaw::statics_pi:
-      return "statics + PI";
-    case RobustnessLaw::integral:
-      return "K_I";
-    case RobustnessLaw::observer:
-      return "observer";
-    case RobustnessLaw::observer_parameters:
-      return "observer + parameters";
-    case RobustnessLaw::observer_repetition:
-      return "observer + repetition";
-  }
-  return "unknown";
+  constexpr const char* kNames[] = {"paper17",  "statics + PI",          "K_I",
+                                    "observer", "observer + parameters", "observer + repetition"};
+  return kNames[static_cast<std::size_t>(law)];
 }
 
 Experiment robustness_experiment(const RobustnessScene& scene, RobustnessLaw law,

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "softarm/config/experiment.hpp"
@@ -66,6 +67,17 @@ struct RobustnessTrial {
   double surprised = 0.0;  ///< part of the frames
   bool stayed_active = true;
 };
+/// Its figures, by their names; the larger the worse.
+inline constexpr std::pair<const char*, double RobustnessTrial::*> kRobustnessFigures[] = {
+    {"u_rms_rad", &RobustnessTrial::u_rms_rad},
+    {"u_largest_rad", &RobustnessTrial::u_largest_rad},
+    {"tip_rms_m", &RobustnessTrial::tip_rms_m},
+    {"e_rms_m", &RobustnessTrial::e_rms_m},
+    {"pressure_rate_bar_per_s", &RobustnessTrial::pressure_rate_bar_per_s},
+    {"tick_us", &RobustnessTrial::tick_us},
+    {"frame_tick_us", &RobustnessTrial::frame_tick_us},
+    {"nis", &RobustnessTrial::nis},
+    {"surprised", &RobustnessTrial::surprised}};
 RobustnessTrial run(const Experiment& experiment, const RobustnessScene& scene, std::uint64_t seed);
 
 /// The same over LCM, in real time: softarmd and softarm-plant beside this program, on a port that its

@@ -1,7 +1,9 @@
-// A folder for files that nobody keeps.
+// A folder for files that nobody keeps, and a network for processes that nobody else hears.
 #pragma once
 
+#include <fmt/format.h>
 #include <stdlib.h>
+#include <unistd.h>
 
 #include <cerrno>
 #include <filesystem>
@@ -32,5 +34,10 @@ class TemporaryFolder {
  private:
   std::filesystem::path path_;
 };
+
+/// An LCM URL of this machine, with a port for this process alone.
+inline std::string own_network() {
+  return fmt::format("udpm://239.255.76.67:{}?ttl=0", 20000 + getpid() % 12000);
+}
 
 }  // namespace softarm

@@ -11,6 +11,9 @@ constexpr SoakFault frames_away(const char* name, const char* relay_fault, doubl
 constexpr SoakFault frames_refused(const char* name) {
   return {name, SoakAction::relay, name, 0.0, Mode::vent, Reason::frames_refused};
 }
+constexpr SoakFault leads_to(Mode mode, Reason reason, const char* name, SoakAction action) {
+  return {name, action, "", 0.0, mode, reason};
+}
 constexpr SoakFault harmless(const char* name, const char* relay_fault,
                              std::int64_t ArmStatus::*counter, int counts, double amount = 0.0) {
   return {name,         SoakAction::relay, relay_fault, amount,
@@ -43,28 +46,23 @@ constexpr std::array kFaults{
     SoakFault{"valves silent", SoakAction::relay, "silence", 0.0, Mode::fault,
               Reason::valves_silent},
     SoakFault{"burst", SoakAction::relay, "burst", 0.0, Mode::fault, Reason::pressure_mismatch},
-    SoakFault{"disarm", SoakAction::disarm, "", 0.0, Mode::vent, Reason::disarmed},
-    SoakFault{"emergency stop", SoakAction::emergency_stop, "", 0.0, Mode::fault,
-              Reason::emergency_stop},
-    SoakFault{"dead man lets go", SoakAction::let_go, "", 0.0, Mode::vent,
-              Reason::deadman_released},
-    SoakFault{"dead man silent", SoakAction::fall_silent, "", 0.0, Mode::vent,
-              Reason::deadman_released},
+    leads_to(Mode::vent, Reason::disarmed, "disarm", SoakAction::disarm),
+    leads_to(Mode::fault, Reason::emergency_stop, "emergency stop", SoakAction::emergency_stop),
+    leads_to(Mode::vent, Reason::deadman_released, "dead man lets go", SoakAction::let_go),
+    leads_to(Mode::vent, Reason::deadman_released, "dead man silent", SoakAction::fall_silent),
     SoakFault{"hostile bytes", SoakAction::hostile, "", 0.0, Mode::active, Reason::none,
               &ArmStatus::messages_malformed, 100},
     SoakFault{"flood", SoakAction::flood, "", 0.0, Mode::active, Reason::none,
               &ArmStatus::messages_malformed, 100},
-    SoakFault{"daemon stopped", SoakAction::pause_daemon, "", 0.0, Mode::vent, Reason::time_gap},
-    SoakFault{"plant stopped", SoakAction::pause_plant, "", 0.0, Mode::vent, Reason::frames_stale},
-    SoakFault{"stop while paused", SoakAction::stop_while_paused, "", 0.0, Mode::fault,
-              Reason::emergency_stop},
-    SoakFault{"stop in a flood", SoakAction::stop_in_flood, "", 0.0, Mode::fault,
-              Reason::emergency_stop},
-    SoakFault{"second commander", SoakAction::second_commander, "", 0.0, Mode::vent,
-              Reason::foreign_commands},
-    SoakFault{"commands lost", SoakAction::lose_commands, "", 0.0, Mode::vent,
-              Reason::command_expired},
-    SoakFault{"suspended", SoakAction::suspend, "", 0.0, Mode::vent, Reason::time_gap},
+    leads_to(Mode::vent, Reason::time_gap, "daemon stopped", SoakAction::pause_daemon),
+    leads_to(Mode::vent, Reason::frames_stale, "plant stopped", SoakAction::pause_plant),
+    leads_to(Mode::fault, Reason::emergency_stop, "stop while paused",
+             SoakAction::stop_while_paused),
+    leads_to(Mode::fault, Reason::emergency_stop, "stop in a flood", SoakAction::stop_in_flood),
+    leads_to(Mode::vent, Reason::foreign_commands, "second commander",
+             SoakAction::second_commander),
+    leads_to(Mode::vent, Reason::command_expired, "commands lost", SoakAction::lose_commands),
+    leads_to(Mode::vent, Reason::time_gap, "suspended", SoakAction::suspend),
     of_valves("terminal refuses", SoakAction::refuse_writes, ValveReason::zero_unconfirmed),
     of_valves("terminal ignores", SoakAction::ignore_writes, ValveReason::zero_unconfirmed),
     of_valves("valves stuck", SoakAction::stick_valves, ValveReason::stuck_valve),
@@ -72,12 +70,10 @@ constexpr std::array kFaults{
     of_valves("driver stopped", SoakAction::pause_valves),
     of_valves("driver suspended", SoakAction::suspend_valves, ValveReason::time_gap),
     of_valves("driver killed", SoakAction::kill_valves),
-    SoakFault{"plant replaced", SoakAction::restart_plant, "", 0.0, Mode::vent,
-              Reason::frames_stale},
+    leads_to(Mode::vent, Reason::frames_stale, "plant replaced", SoakAction::restart_plant),
     SoakFault{"daemon ended", SoakAction::end_daemon},
     SoakFault{"daemon killed", SoakAction::kill_daemon},
-    SoakFault{"killed in FAULT", SoakAction::kill_stopped, "", 0.0, Mode::fault,
-              Reason::emergency_stop},
+    leads_to(Mode::fault, Reason::emergency_stop, "killed in FAULT", SoakAction::kill_stopped),
 };
 
 }  // namespace

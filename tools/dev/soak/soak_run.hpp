@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "dev/child_process.hpp"
+#include "apps/child_process.hpp"
 #include "dev/clock/preloaded_clocks.hpp"
 #include "dev/fault/bad_terminal.hpp"
 #include "dev/fault/fault_relay.hpp"

@@ -17,6 +17,16 @@ struct Finding {
   std::string text =
       {};  ///< what was measured, with units; what is wrong; or why it was not checked
   std::string fix = {};  ///< how to fix what failed
+
+  static Finding passed(const std::string& check, const std::string& text) {
+    return {check, Verdict::pass, text, ""};
+  }
+  static Finding failed(const std::string& check, const std::string& text, const std::string& fix) {
+    return {check, Verdict::fail, text, fix};
+  }
+  static Finding not_checked(const std::string& check, const std::string& why) {
+    return {check, Verdict::not_checked, why, ""};
+  }
 };
 
 /// Whether any of them failed.

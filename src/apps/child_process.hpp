@@ -7,7 +7,10 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <cerrno>
 #include <chrono>
+#include <cstdio>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
@@ -21,34 +24,37 @@ namespace softarm {
 class ChildProcess {
  public:
   /// Starts `program`: a path, or a name that PATH knows. What it prints goes to the file `output`.
-  /// A program that cannot be started ends with exit code 127. It is killed when this object, or
-  /// the thread that made it, ends; a terminal's Ctrl-C does not reach it.
+  /// One that cannot be started prints why and ends with exit code 127. When this object, or the
+  /// thread that made it, ends, it gets the signal `at_end` and its end is awaited; a terminal's
+  /// Ctrl-C does not reach it.
   ChildProcess(const std::string& program, const std::vector<std::string>& arguments,
-               std::string output)
-      : output_(std::move(output)) {
+               std::string output, int at_end = SIGKILL)
+      : output_(std::move(output)), at_end_(at_end) {
     std::vector<char*> argv{const_cast<char*>(program.c_str())};
     for (const std::string& argument : arguments)
       argv.push_back(const_cast<char*>(argument.c_str()));
     argv.push_back(nullptr);
     pid_ = fork();
     if (pid_ != 0) return;
-    prctl(PR_SET_PDEATHSIG, SIGKILL);
+    prctl(PR_SET_PDEATHSIG, at_end_);
     setpgid(0, 0);
     const int file = open(output_.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0644);
     dup2(file, STDOUT_FILENO);
     dup2(file, STDERR_FILENO);
     close_range(STDERR_FILENO + 1, ~0U, CLOSE_RANGE_CLOEXEC);  // sockets are not inherited
     execvp(program.c_str(), argv.data());
+    dprintf(STDERR_FILENO, "%s: %s\n", program.c_str(), std::strerror(errno));
     _exit(127);
   }
   ~ChildProcess() {
     if (pid_ <= 0) return;
-    kill(pid_, SIGKILL);
+    kill(pid_, at_end_);
     waitpid(pid_, nullptr, 0);
   }
   ChildProcess(const ChildProcess&) = delete;
   ChildProcess& operator=(const ChildProcess&) = delete;
 
+  bool runs() { return pid_ > 0 && wait(std::chrono::milliseconds(0)) < 0; }
   /// -1 once `wait` has seen its end.
   int pid() const { return pid_; }
   /// Nothing happens where it has ended.
@@ -87,6 +93,7 @@ class ChildProcess {
 
  private:
   std::string output_;
+  int at_end_;
   pid_t pid_ = -1;
 };
 

@@ -1,9 +1,13 @@
-#include "apps/softarm/python_module.hpp"
+#include "apps/python.hpp"
 
 #include <unistd.h>
 
+#include <cerrno>
 #include <cstdlib>
+#include <cstring>
 #include <filesystem>
+
+#include "apps/program.hpp"
 
 namespace softarm {
 namespace {
@@ -17,18 +21,19 @@ std::string python() {
 
 }  // namespace
 
-std::string run_python_module(const std::string& module, const std::vector<std::string>& words) {
+int become_python(const std::string& program, std::vector<std::string> words) {
   std::error_code error;
-  const auto program = std::filesystem::read_symlink("/proc/self/exe", error);
-  const auto built = program.parent_path().parent_path() / "python";
+  const auto built =
+      std::filesystem::read_symlink("/proc/self/exe", error).parent_path().parent_path() / "python";
   if (std::filesystem::exists(built / "softarm", error)) ::setenv("PYTHONPATH", built.c_str(), 1);
-  std::vector<std::string> all = {python(), "-m", module};
-  all.insert(all.end(), words.begin(), words.end());
+  words.insert(words.begin(), python());
   std::vector<char*> pointers;
-  for (std::string& word : all) pointers.push_back(word.data());
+  for (std::string& word : words) pointers.push_back(word.data());
   pointers.push_back(nullptr);
   ::execv(pointers[0], pointers.data());
-  return all[0];
+  return fail(program, kExitFailure,
+              "cannot start " + words[0] + ": " + std::strerror(errno) +
+                  "; tools/python_environment makes a Python for this");
 }
 
 CLI::Validator law_name() {
