@@ -78,6 +78,7 @@ class Checks {
       control_.law.make({arm_, control_, chamber_count(actuation_)});
     });
     check_inverse();
+    check_identified();
     check_reference();
     if (control_.repetition.lead_s > 0.0) check_repetition();
     // What the form of each key allows, but cannot be meant: mostly slips of units.
@@ -263,6 +264,16 @@ class Checks {
     if (inverse.lags())
       above("control.valve_lag_s", control_.valve_lag_s, 0.0, "zero",
             ", the lag that the inverse of the chambers' lags leaves");
+  }
+
+  void check_identified() const {
+    const IdentificationSettings& it = experiment_.identification;
+    const auto stretches = [](double gain) { return gain != 0.0; };
+    require(it.stiffening_by_length == 0.0 ||
+                std::any_of(it.stretch_m_per_bar.begin(), it.stretch_m_per_bar.end(), stretches),
+            "identification.stiffening_by_length",
+            "0 without identification.stretch_m_per_bar, which gives the lengths",
+            fmt::format("{:g}", it.stiffening_by_length));
   }
 
   void check_reference() const {

@@ -241,8 +241,8 @@ class Selection {
     }
   }
 
-  /// One term for one or two others: those of the best forecast from the sensitivities of this model,
-  /// and those that promise most if what single steps did were to add up.
+  /// One term for one or two others, or two at once: those of the best forecast from the sensitivities
+  /// of this model, and those that promise most if what single steps did were to add up.
   std::vector<Move> exchanges() const {
     Ranked forecast, added_up;
     std::optional<ParameterSet> all;

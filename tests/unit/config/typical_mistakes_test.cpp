@@ -150,6 +150,9 @@ const Mistake kMistakes[] = {
     {"name: good", "name: Gr\xf6\x62li", "name", "save the file as UTF-8"},
     {"seed: 7", "include: not_there.yaml", "include", "an existing file, relative to this one"},
     {"seed: 7", "include: wrong.yaml", "include", "a file that does not include this one again"},
+    // What was identified and does not belong together.
+    {"reference:", "identification: {stiffening_by_length: 3}\nreference:",
+     "identification.stiffening_by_length", "identification.stretch_m_per_bar"},
 };
 
 class TypicalMistake : public testing::TestWithParam<Mistake> {};
