@@ -15,7 +15,8 @@ namespace softarm {
 namespace {
 
 namespace fs = std::filesystem;
-constexpr double kStart_s = 10.0;        ///< until the first status
+constexpr double kStart_s = 10.0;  ///< until the first status
+constexpr double kLook_s = 0.1;
 constexpr double kSettle_s = 1.0;        ///< of ACTIVE before errors count
 constexpr double kLongestWait_s = 20.0;  ///< not ACTIVE, in all
 
@@ -37,7 +38,10 @@ struct Errors {
 /// Arms, and waits for `duration_s` of ACTIVE. Returns why not.
 std::string follow(OperatorClient& client, ChildProcess& daemon, StatusRecord& record,
                    double duration_s) {
-  if (!client.wait_for_status(kStart_s)) return "softarmd gives no status";
+  for (double left_s = kStart_s; !client.wait_for_status(kLook_s); left_s -= kLook_s) {
+    if (!daemon.runs()) return "softarmd has ended";
+    if (left_s <= 0.0) return "softarmd gives no status";
+  }
   if (client.request(OperatorRequest::arm) != RequestOutcome::done)
     return "softarmd does not arm; it is in " + client.daemon_text();
   Progress progress(true);
