@@ -273,7 +273,7 @@ class Checks {
                 std::any_of(it.stretch_m_per_bar.begin(), it.stretch_m_per_bar.end(), stretches),
             "identification.stiffening_by_length",
             "0 without identification.stretch_m_per_bar, which gives the lengths",
-            fmt::format("{:g}", it.stiffening_by_length));
+            it.stiffening_by_length);
   }
 
   void check_reference() const {

@@ -43,7 +43,7 @@ struct FitChoice {
   bool remanence = false;  ///< the rest creeps after use: share, time, and where it is at first
   bool second_remanence = false;  ///< another one that is faster, from rest at first
   bool stiffening = false;        ///< k (1 + s sum p)
-  bool by_length = false;  ///< k (l / L)^p, l as pressures alone give it by a known elongation
+  bool by_length = false;         ///< k (l / L)^q, l by an elongation that is known
   /// Chambers act on the segments nearer the base, too, which their tendons or tubes pass.
   bool cross = false;
   bool mass = false;    ///< one factor on all masses, against the configured ones

@@ -56,13 +56,13 @@ struct SelectionOptions {
 /// Begins with `plain` and adds one term at a time. Of the bend, in the order of the value that they
 /// had on real arms: stiffening by length, asymmetric lag, rest, cross-coupling, hysteresis,
 /// saturation, lags of every chamber, masses (gravity beside k), remanence, delay, stiffening, cubic
-/// stiffness. Of the elongation, which is quick, the best of all that are left each time. What is lowered is
-/// log(error on what was not seen) + `least_gain` times the number of terms: a term stays where the
-/// error becomes less by `least_gain`. Then all terms of the bend are gone through again, three times
+/// stiffness. Of the elongation, which is quick, the best of all that are left each time. What is
+/// lowered is log(error on what was not seen) + `least_gain` times the number of terms: a term stays
+/// where the error becomes less by `least_gain`. Then all terms of the bend are gone through again, three times
 /// at most: one that is not worth that goes, one that now is comes. Where no single step helps, one
 /// term is exchanged for one or two others, or two come at once, by `ExchangeForecast` in the order
-/// of what the sensitivities promise. At last other widths of the prior are tried. The result does not depend on
-/// the number of threads.
+/// of what the sensitivities promise. At last other widths of the prior are tried. The result does
+/// not depend on the number of threads.
 /// @param start  what is configured; every segment gets slip springs at radii taken from the motion
 /// @throws std::runtime_error as `identify`, of the plain model only
 SelectedModel select_terms(const ArmHypothesis& start, ActuationKind kind, const FitChoice& plain,
